@@ -1,0 +1,1 @@
+"""Cameras, one device per file."""

@@ -1,0 +1,1 @@
+"""Grippers, one device per file."""

@@ -1,0 +1,1 @@
+"""Robot arms behind one `Robot` protocol."""

@@ -1,0 +1,21 @@
+"""Errors whose one-line message names the file, the value and the cure; the command line prints just that line."""
+
+
+class HecbenchError(Exception):
+    """Something failed although it was asked for correctly. The command line exits with 1."""
+
+    exit_code = 1
+
+
+class InputError(HecbenchError):
+    """Wrong usage or unreadable input. The command line exits with 2."""
+
+    exit_code = 2
+
+
+class Refusal(HecbenchError):
+    """A solver cannot answer on this recording; the message is the reason, one sentence. Status `refused`."""
+
+
+class SolverFailure(HecbenchError):
+    """A solver ran and knows that its answer is wrong or missing; the message says why. Status `failed`."""

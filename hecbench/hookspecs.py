@@ -1,0 +1,83 @@
+"""The hooks a plugin may implement. Each yields specs (see `hecbench.specs`); importing a plugin stays cheap."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import pluggy
+
+from hecbench.specs import (
+    DatasetSpec,
+    DeviceSpec,
+    EvaluatorSpec,
+    ExporterSpec,
+    SegmenterSpec,
+    SolverSpec,
+    SuiteSpec,
+    TranslatorSpec,
+)
+
+GROUP = "hecbench"
+"""The entry-point group and the prefix of every hook."""
+
+hookspec = pluggy.HookspecMarker(GROUP)
+
+
+@hookspec
+def hecbench_solvers() -> Iterable[SolverSpec]:
+    """Calibration methods."""
+    raise NotImplementedError
+
+
+@hookspec
+def hecbench_datasets() -> Iterable[DatasetSpec]:
+    """Readers of recordings on disk."""
+    raise NotImplementedError
+
+
+@hookspec
+def hecbench_suites() -> Iterable[SuiteSpec]:
+    """Generated recordings by name and level."""
+    raise NotImplementedError
+
+
+@hookspec
+def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
+    """Rulers: numbers computed from an estimate and its recording."""
+    raise NotImplementedError
+
+
+@hookspec
+def hecbench_exporters() -> Iterable[ExporterSpec]:
+    """Writers of an estimate in other people's formats."""
+    raise NotImplementedError
+
+
+@hookspec
+def hecbench_segmenters() -> Iterable[SegmenterSpec]:
+    """Robot masks from images."""
+    raise NotImplementedError
+
+
+@hookspec
+def hecbench_translators() -> Iterable[TranslatorSpec]:
+    """Real-to-simulated image translation."""
+    raise NotImplementedError
+
+
+@hookspec
+def hecbench_robots() -> Iterable[DeviceSpec]:
+    """Robot arms, simulated and real."""
+    raise NotImplementedError
+
+
+@hookspec
+def hecbench_grippers() -> Iterable[DeviceSpec]:
+    """Grippers, simulated and real."""
+    raise NotImplementedError
+
+
+@hookspec
+def hecbench_cameras() -> Iterable[DeviceSpec]:
+    """Cameras, simulated and real."""
+    raise NotImplementedError

@@ -1,0 +1,171 @@
+"""Discovery of plugins. Broken, conflicting and not-ready plugins are data to be listed, never crashes.
+
+An entry point of the group ``hecbench`` names a module with hooks, or a package whose ``plugin_modules`` lists
+modules with hooks. Every module is imported inside its own ``try``, so one bad file costs one plugin.
+"""
+
+from __future__ import annotations
+
+import pkgutil
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from functools import cache
+from importlib import import_module, metadata
+from importlib.util import find_spec
+from types import ModuleType
+from typing import Any, TypeVar
+
+import pluggy
+
+from hecbench import hookspecs
+from hecbench.errors import InputError
+from hecbench.specs import AnySpec, Kind, SolverSpec, Spec
+
+hookimpl = pluggy.HookimplMarker(hookspecs.GROUP)
+
+AnySpecT = TypeVar("AnySpecT", bound=Spec)
+
+
+class PluginStatus(StrEnum):
+    """Whether a plugin can be used: `missing` lacks an import, `conflict` shares its name with another."""
+
+    READY = "ready"
+    MISSING = "missing"
+    BROKEN = "broken"
+    CONFLICT = "conflict"
+
+
+@dataclass(frozen=True)
+class Plugin:
+    """One listed plugin. `spec` is None when its module could not be loaded; `detail` says why it is not ready."""
+
+    name: str
+    kind: Kind | None
+    status: PluginStatus
+    distribution: str
+    version: str
+    detail: str = ""
+    spec: AnySpec | None = None
+
+    def row(self) -> dict[str, Any]:
+        """The row of ``hecbench plugins --json``."""
+        needs = sorted(self.spec.needs) if isinstance(self.spec, SolverSpec) else []
+        return {
+            "name": self.name,
+            "kind": self.kind,
+            "status": self.status,
+            "needs": needs,
+            "detail": self.detail or (self.spec.summary if self.spec else ""),
+            "distribution": self.distribution,
+            "version": self.version,
+        }
+
+
+def submodules(package_name: str, folder: str = "") -> tuple[str, ...]:
+    """Full names of the modules in a package (or in its sub-package `folder`), without importing them."""
+    package = import_module(f"{package_name}.{folder}" if folder else package_name)
+    found = pkgutil.iter_modules(package.__path__, prefix=f"{package.__name__}.")
+    return tuple(module.name for module in found if not module.ispkg)
+
+
+@dataclass(frozen=True)
+class Registry:
+    """All plugins, found once, sorted by kind and name."""
+
+    plugins: list[Plugin]
+
+    def select(self, kind: Kind | None = None) -> list[Plugin]:
+        """Plugins of one kind or, with the unloadable ones, of all."""
+        return [plugin for plugin in self.plugins if kind in (None, plugin.kind)]
+
+    def ready(self, kind: Kind, spec_type: type[AnySpecT]) -> list[AnySpecT]:
+        """Specs of one kind that can be used now."""
+        specs = [plugin.spec for plugin in self.select(kind) if plugin.status is PluginStatus.READY]
+        return [spec for spec in specs if isinstance(spec, spec_type)]
+
+    def get(self, kind: Kind, name: str, spec_type: type[AnySpecT]) -> AnySpecT:
+        """The ready spec of that name; otherwise an `InputError` that says why not and what there is."""
+        found = [plugin for plugin in self.select(kind) if plugin.name == name]
+        if not found:
+            names = ", ".join(spec.name for spec in self.ready(kind, spec_type)) or "none"
+            raise InputError(f"no {kind} is called '{name}': choose one of {names}")
+        plugin = found[0]
+        if plugin.status is not PluginStatus.READY or not isinstance(plugin.spec, spec_type):
+            raise InputError(f"{kind} '{name}' is {plugin.status}: {plugin.detail}")
+        return plugin.spec
+
+
+@cache
+def load() -> Registry:
+    """Find every installed plugin, ours and strangers'."""
+    return build(metadata.entry_points(group=hookspecs.GROUP))
+
+
+def build(entry_points: Iterable[metadata.EntryPoint]) -> Registry:
+    """Load the given entry points one by one and collect their specs."""
+    plugins = [
+        plugin
+        for entry_point in sorted(entry_points, key=lambda e: (e.name, e.value))
+        for plugin in _plugins_of(entry_point)
+    ]
+    return Registry(sorted(_refuse_shared_names(plugins), key=lambda p: (p.kind or "", p.name)))
+
+
+def _plugins_of(entry_point: metadata.EntryPoint) -> Iterator[Plugin]:
+    distribution = entry_point.dist.name if entry_point.dist else "unknown"
+    version = entry_point.dist.version if entry_point.dist else "unknown"
+
+    def broken(name: str, error: BaseException) -> Plugin:
+        detail = f"{type(error).__name__}: {error}".splitlines()[0]
+        return Plugin(name, None, PluginStatus.BROKEN, distribution, version, detail)
+
+    try:
+        target = entry_point.load()
+    except Exception as error:  # a stranger's module may raise anything at import
+        yield broken(entry_point.name, error)
+        return
+    for module_name in getattr(target, "plugin_modules", (target.__name__,)):
+        try:
+            specs = _specs(import_module(module_name))
+        except Exception as error:  # likewise
+            yield broken(module_name, error)
+            continue
+        for spec in specs:
+            status, detail = _readiness(spec)
+            yield Plugin(spec.name, spec.kind, status, distribution, version, detail, spec)
+
+
+def _specs(module: ModuleType) -> list[AnySpec]:
+    """Everything that the hooks of one module yield; a misspelt hook raises instead of being ignored."""
+    manager = pluggy.PluginManager(hookspecs.GROUP)
+    manager.add_hookspecs(hookspecs)
+    manager.register(module)
+    manager.check_pending()
+    specs = [spec for hook in manager.get_hookcallers(module) or [] for yielded in hook() for spec in yielded]
+    for spec in specs:
+        if not isinstance(spec, Spec):
+            raise TypeError(f"a hook yielded {spec!r}, expected a spec of hecbench.specs")
+    return specs
+
+
+def _readiness(spec: Spec) -> tuple[PluginStatus, str]:
+    absent = [name for name in spec.imports if find_spec(name.partition(".")[0]) is None]
+    if absent:
+        return PluginStatus.MISSING, f"needs {', '.join(absent)}, not installed: see `hecbench doctor`"
+    return PluginStatus.READY, ""
+
+
+def _refuse_shared_names(plugins: list[Plugin]) -> list[Plugin]:
+    """Mark every plugin whose kind and name another one claims too: neither is used until one goes."""
+    claims = Counter((plugin.kind, plugin.name) for plugin in plugins if plugin.spec)
+
+    def checked(plugin: Plugin) -> Plugin:
+        if plugin.spec is None or claims[plugin.kind, plugin.name] == 1:
+            return plugin
+        claimants = sorted(p.distribution for p in plugins if (p.kind, p.name) == (plugin.kind, plugin.name))
+        detail = f"the name is claimed by {' and '.join(claimants)}: uninstall or rename one"
+        return replace(plugin, status=PluginStatus.CONFLICT, detail=detail)
+
+    return [checked(plugin) for plugin in plugins]

@@ -1,0 +1,173 @@
+"""Rigid transforms as (..., 4, 4) float64 arrays named by their frames: ``p_a = a_T_b @ p_b``.
+
+Every function is vectorised over leading axes. Metres and radians throughout. Twists are ``[phi, rho]``, rotation
+first; perturbations act from the left, in the parent frame: ``X_true = exp(xi) @ X_est``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.spatial.transform import Rotation
+
+Array = NDArray[np.float64]
+
+_SMALL_ANGLE_RAD = 1e-4
+
+
+def make(rotation: ArrayLike, translation: ArrayLike) -> Array:
+    """Stack rotations (..., 3, 3) and translations (..., 3) m into transforms (..., 4, 4)."""
+    rotation, translation = np.asarray(rotation, float), np.asarray(translation, float)
+    shape = np.broadcast_shapes(rotation.shape[:-2], translation.shape[:-1])
+    a_T_b = np.zeros((*shape, 4, 4))
+    a_T_b[..., :3, :3] = rotation
+    a_T_b[..., :3, 3] = translation
+    a_T_b[..., 3, 3] = 1.0
+    return a_T_b
+
+
+def inverse(a_T_b: ArrayLike) -> Array:
+    """b_T_a (..., 4, 4): maps points of a back into b."""
+    a_T_b = np.asarray(a_T_b, float)
+    b_R_a = np.swapaxes(a_T_b[..., :3, :3], -1, -2)
+    return make(b_R_a, -(b_R_a @ a_T_b[..., :3, 3:])[..., 0])
+
+
+def transform_points(a_T_b: ArrayLike, points_b: ArrayLike) -> Array:
+    """Points (..., P, 3) of frame b in frame a, for transforms (..., 4, 4)."""
+    a_T_b, points_b = np.asarray(a_T_b, float), np.asarray(points_b, float)
+    return points_b @ np.swapaxes(a_T_b[..., :3, :3], -1, -2) + a_T_b[..., None, :3, 3]
+
+
+def hat(v: ArrayLike) -> Array:
+    """Cross-product matrices (..., 3, 3) of vectors (..., 3): ``hat(v) @ w == cross(v, w)``."""
+    v = np.asarray(v, float)
+    x, y, z = v[..., 0], v[..., 1], v[..., 2]
+    zero = np.zeros_like(x)
+    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1).reshape(*v.shape[:-1], 3, 3)
+
+
+def so3_exp(rotvec: ArrayLike) -> Array:
+    """Rotation matrices (..., 3, 3) of rotation vectors (..., 3) rad."""
+    rotvec = np.asarray(rotvec, float)
+    matrices = Rotation.from_rotvec(rotvec.reshape(-1, 3)).as_matrix()
+    return np.asarray(matrices.reshape(*rotvec.shape[:-1], 3, 3))
+
+
+def so3_log(rotation: ArrayLike) -> Array:
+    """Rotation vectors (..., 3) rad, of angle at most pi, of rotation matrices (..., 3, 3)."""
+    rotation = np.asarray(rotation, float)
+    rotvecs = Rotation.from_matrix(rotation.reshape(-1, 3, 3)).as_rotvec()
+    return np.asarray(rotvecs.reshape(*rotation.shape[:-2], 3))
+
+
+def left_jacobian(rotvec: ArrayLike) -> Array:
+    """V(phi) (..., 3, 3) of SO(3), with ``exp([phi, rho]).translation = V(phi) rho`` (Barfoot 2017, eq. 7.37)."""
+    rotvec = np.asarray(rotvec, float)
+    angle = np.linalg.norm(rotvec, axis=-1)[..., None, None]
+    small = angle < _SMALL_ANGLE_RAD
+    safe = np.where(small, 1.0, angle)
+    first = np.where(small, 0.5 - angle**2 / 24, (1 - np.cos(safe)) / safe**2)
+    second = np.where(small, 1 / 6 - angle**2 / 120, (safe - np.sin(safe)) / safe**3)
+    cross = hat(rotvec)
+    return np.asarray(np.eye(3) + first * cross + second * (cross @ cross))
+
+
+def exp(twist: ArrayLike) -> Array:
+    """Transforms (..., 4, 4) of twists (..., 6) = [phi rad, rho m]."""
+    twist = np.asarray(twist, float)
+    phi, rho = twist[..., :3], twist[..., 3:]
+    return make(so3_exp(phi), (left_jacobian(phi) @ rho[..., None])[..., 0])
+
+
+def log(a_T_b: ArrayLike) -> Array:
+    """Twists (..., 6) = [phi rad, rho m] of transforms (..., 4, 4); the inverse of `exp` for angles below pi."""
+    a_T_b = np.asarray(a_T_b, float)
+    phi = so3_log(a_T_b[..., :3, :3])
+    rho = np.linalg.solve(left_jacobian(phi), a_T_b[..., :3, 3:])[..., 0]
+    return np.concatenate([phi, rho], -1)
+
+
+def adjoint(a_T_b: ArrayLike) -> Array:
+    """Ad (..., 6, 6) with ``a_T_b @ exp(xi) = exp(Ad @ xi) @ a_T_b``: moves a twist from frame b to frame a."""
+    a_T_b = np.asarray(a_T_b, float)
+    rotation = a_T_b[..., :3, :3]
+    ad = np.zeros((*a_T_b.shape[:-2], 6, 6))
+    ad[..., :3, :3] = ad[..., 3:, 3:] = rotation
+    ad[..., 3:, :3] = hat(a_T_b[..., :3, 3]) @ rotation
+    return ad
+
+
+def nearest_rotation(matrix: ArrayLike) -> Array:
+    """The proper rotations (..., 3, 3) nearest to matrices (..., 3, 3) in the Frobenius norm (Kabsch 1976)."""
+    u, _, vt = np.linalg.svd(np.asarray(matrix, float))
+    u[..., :, 2] *= np.sign(np.linalg.det(u @ vt))[..., None]
+    return np.asarray(u @ vt)
+
+
+def mean(a_T_b: ArrayLike) -> Array:
+    """Chordal mean (4, 4) of transforms (N, 4, 4): nearest rotation to the mean matrix, mean translation."""
+    a_T_b = np.asarray(a_T_b, float)
+    return make(nearest_rotation(a_T_b[:, :3, :3].mean(0)), a_T_b[:, :3, 3].mean(0))
+
+
+def rotation_angle(rotation: ArrayLike) -> Array:
+    """Rotation angles (...,) rad in [0, pi] of rotations (..., 3, 3), accurate at both ends."""
+    rotation = np.asarray(rotation, float)
+    skew = rotation - np.swapaxes(rotation, -1, -2)
+    twice_sine = np.sqrt((skew**2).sum((-1, -2)) / 2)
+    return np.asarray(np.arctan2(twice_sine, np.trace(rotation, axis1=-2, axis2=-1) - 1))
+
+
+def rotation_error_rad(a_T_b: ArrayLike, a_T_c: ArrayLike) -> Array:
+    """Geodesic angles (...,) rad between the rotations of two (stacks of) transforms."""
+    a_T_b, a_T_c = np.asarray(a_T_b, float), np.asarray(a_T_c, float)
+    return rotation_angle(np.swapaxes(a_T_b[..., :3, :3], -1, -2) @ a_T_c[..., :3, :3])
+
+
+def translation_error_m(a_T_b: ArrayLike, a_T_c: ArrayLike) -> Array:
+    """Distances (...,) m between the origins of b and c, both expressed in a."""
+    difference = np.asarray(a_T_b, float)[..., :3, 3] - np.asarray(a_T_c, float)[..., :3, 3]
+    return np.asarray(np.linalg.norm(difference, axis=-1))
+
+
+def is_transform(a_T_b: ArrayLike, tolerance: float = 1e-6) -> bool:
+    """Whether every (..., 4, 4) is finite, has a proper rotation and the last row 0 0 0 1, within the tolerance."""
+    a_T_b = np.asarray(a_T_b, float)
+    if a_T_b.shape[-2:] != (4, 4) or not np.isfinite(a_T_b).all():
+        return False
+    rotation = a_T_b[..., :3, :3]
+    orthonormal = np.abs(rotation @ np.swapaxes(rotation, -1, -2) - np.eye(3)).max(initial=0.0) <= tolerance
+    proper = bool((np.linalg.det(rotation) > 0).all())
+    last_row = np.abs(a_T_b[..., 3, :] - [0, 0, 0, 1]).max(initial=0.0) <= tolerance
+    return bool(orthonormal and proper and last_row)
+
+
+def from_rotvec(rotvec: ArrayLike, translation: ArrayLike) -> Array:
+    """Transforms of rotation vectors (..., 3) rad and translations (..., 3) m."""
+    return make(so3_exp(rotvec), translation)
+
+
+def from_quat_xyzw(quaternion: ArrayLike, translation: ArrayLike) -> Array:
+    """Transforms of quaternions (..., 4) in the order x, y, z, w (ROS, scipy) and translations (..., 3) m."""
+    quaternion = np.asarray(quaternion, float)
+    matrices = Rotation.from_quat(quaternion.reshape(-1, 4)).as_matrix()
+    return make(matrices.reshape(*quaternion.shape[:-1], 3, 3), translation)
+
+
+def from_quat_wxyz(quaternion: ArrayLike, translation: ArrayLike) -> Array:
+    """Transforms of quaternions (..., 4) in the order w, x, y, z (Eigen, MuJoCo) and translations (..., 3) m."""
+    return from_quat_xyzw(np.roll(np.asarray(quaternion, float), -1, axis=-1), translation)
+
+
+def to_quat_xyzw(a_T_b: ArrayLike) -> Array:
+    """Quaternions (..., 4) in the order x, y, z, w with w >= 0 of transforms (..., 4, 4)."""
+    a_T_b = np.asarray(a_T_b, float)
+    matrices = a_T_b[..., :3, :3].reshape(-1, 3, 3)
+    quaternions = Rotation.from_matrix(matrices).as_quat(canonical=True)
+    return np.asarray(quaternions.reshape(*a_T_b.shape[:-2], 4))
+
+
+def to_quat_wxyz(a_T_b: ArrayLike) -> Array:
+    """Quaternions (..., 4) in the order w, x, y, z with w >= 0 of transforms (..., 4, 4)."""
+    return np.roll(to_quat_xyzw(a_T_b), 1, axis=-1)

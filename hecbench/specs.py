@@ -1,0 +1,172 @@
+"""What a plugin declares about itself: a name, one sentence, what it needs, and how to build it when it is used."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from hecbench.estimate import Estimate
+    from hecbench.recording import Recording
+
+
+class Kind(StrEnum):
+    """The kinds of plugin, as the command line spells them."""
+
+    SOLVER = "solver"
+    DATASET = "dataset"
+    SUITE = "suite"
+    EVALUATOR = "evaluator"
+    EXPORTER = "exporter"
+    SEGMENTER = "segmenter"
+    TRANSLATOR = "translator"
+    ROBOT = "robot"
+    GRIPPER = "gripper"
+    CAMERA = "camera"
+
+
+class Need(StrEnum):
+    """What a solver asks of a recording."""
+
+    TARGET_POSES = "target_poses"
+    CORNERS = "corners"
+    INTRINSICS = "intrinsics"
+    IMAGES = "images"
+    MASKS = "masks"
+    JOINTS = "joints"
+    ROBOT_MODEL = "robot_model"
+    INITIAL = "initial"
+
+
+class Solver(Protocol):
+    """A calibration method: a recording without its truth goes in, an estimate with its evidence comes out."""
+
+    def __call__(self, recording: Recording, *, rng: np.random.Generator) -> Estimate:
+        """Answer, or raise `Refusal` (cannot on this recording) or `SolverFailure` (tried and knows it failed)."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class Spec:
+    """What every plugin has. `imports` are the importable modules without which it is `missing`, not broken."""
+
+    name: str
+    summary: str
+    imports: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class SolverSpec(Spec):
+    """A calibration method. `factory()` imports what is heavy and returns the `Solver`."""
+
+    kind: ClassVar[Kind] = Kind.SOLVER
+    factory: Callable[[], Solver]
+    needs: frozenset[Need]
+    reference: str
+    slow: bool = False
+    """Folds of the held-out ruler run only when asked for (renderer methods)."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class DatasetSpec(Spec):
+    """A reader of one format. `sniff(path)` is quick and never raises; `load(path)` decodes no image."""
+
+    kind: ClassVar[Kind] = Kind.DATASET
+    sniff: Callable[[Path], bool]
+    load: Callable[[Path], Recording]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SuiteSpec(Spec):
+    """Generated recordings. `make(level, index, seed)` depends on nothing else, so items stream in any order."""
+
+    kind: ClassVar[Kind] = Kind.SUITE
+    levels: tuple[str, ...]
+    default_samples: int
+    make: Callable[[str, int, int], Recording]
+
+
+@dataclass(frozen=True)
+class Column:
+    """One number of an evaluator: its unit, and whether smaller is better (None: neither)."""
+
+    name: str
+    unit: str
+    smaller_is_better: bool | None = True
+
+
+class Evaluator(Protocol):
+    """A ruler. `solve` calibrates another recording with the same method, for rulers that refit on folds."""
+
+    def __call__(
+        self,
+        estimate: Estimate,
+        recording: Recording,
+        *,
+        solve: Callable[[Recording], Estimate],
+        rng: np.random.Generator,
+    ) -> Mapping[str, Any]: ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class EvaluatorSpec(Spec):
+    """A ruler. Its columns go into `estimate.errors` when it reads the truth, else into `estimate.held_out`."""
+
+    kind: ClassVar[Kind] = Kind.EVALUATOR
+    columns: tuple[Column, ...]
+    factory: Callable[[], Evaluator]
+    reads_truth: bool
+    applies: Callable[[Recording], bool]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExporterSpec(Spec):
+    """A writer. `write(estimate, options)` returns the text; `options` are the strings given on the command line."""
+
+    kind: ClassVar[Kind] = Kind.EXPORTER
+    suffix: str
+    write: Callable[[Estimate, Mapping[str, str]], str]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SegmenterSpec(Spec):
+    """Robot masks. `factory()` returns a function recording -> recording with `masks`."""
+
+    kind: ClassVar[Kind] = Kind.SEGMENTER
+    factory: Callable[[], Callable[[Recording], Recording]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class TranslatorSpec(Spec):
+    """Image translation. `factory()` returns the translation function."""
+
+    kind: ClassVar[Kind] = Kind.TRANSLATOR
+    factory: Callable[[], Callable[..., Any]]
+
+
+@dataclass(frozen=True, kw_only=True)
+class DeviceSpec(Spec):
+    """A robot, gripper or camera. `open(options)` imports the SDK and connects; `options` are strings by name."""
+
+    kind: Kind
+    open: Callable[[Mapping[str, str]], Any]
+    simulated: bool
+    options: tuple[str, ...] = field(default=())
+
+
+AnySpec = (
+    SolverSpec
+    | DatasetSpec
+    | SuiteSpec
+    | EvaluatorSpec
+    | ExporterSpec
+    | SegmenterSpec
+    | TranslatorSpec
+    | DeviceSpec
+)
+SpecIterable = Iterable[AnySpec]

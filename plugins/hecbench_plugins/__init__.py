@@ -1,0 +1,6 @@
+"""Calibration methods and rulers, one per file."""
+
+from hecbench.registry import submodules
+
+plugin_modules = (*submodules(__name__, "solvers"), *submodules(__name__, "evaluators"))
+"""Modules whose hooks belong to this package, imported one by one when plugins are listed."""

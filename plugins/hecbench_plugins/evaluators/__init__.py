@@ -1,0 +1,1 @@
+"""Rulers, one metric family per file."""
