@@ -1,3 +1,3 @@
-"""hecbench: hand-eye calibrators, marker-based and markerless, on the same recordings and by the same rulers."""
+"""hecbench: hand-eye calibrators of every kind on the same recordings, by the same rulers."""
 
 __version__ = "0.1.0"

@@ -1,4 +1,4 @@
-"""Errors whose one-line message names the file, the value and the cure; the command line prints just that line."""
+"""Errors whose one-line message names the file, the value and the cure; the command line prints it alone."""
 
 
 class HecbenchError(Exception):

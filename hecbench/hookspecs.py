@@ -1,4 +1,4 @@
-"""The hooks a plugin may implement. Each yields specs (see `hecbench.specs`); importing a plugin stays cheap."""
+"""The hooks a plugin may implement. Each yields specs of `hecbench.specs`; importing a plugin stays cheap."""
 
 from __future__ import annotations
 

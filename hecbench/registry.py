@@ -1,6 +1,6 @@
 """Discovery of plugins. Broken, conflicting and not-ready plugins are data to be listed, never crashes.
 
-An entry point of the group ``hecbench`` names a module with hooks, or a package whose ``plugin_modules`` lists
+An entry point of group ``hecbench`` names a module with hooks, or a package whose ``plugin_modules`` lists
 modules with hooks. Every module is imported inside its own ``try``, so one bad file costs one plugin.
 """
 
@@ -39,7 +39,7 @@ class PluginStatus(StrEnum):
 
 @dataclass(frozen=True)
 class Plugin:
-    """One listed plugin. `spec` is None when its module could not be loaded; `detail` says why it is not ready."""
+    """One listed plugin. `spec` is None when its module could not be loaded; `detail` says why."""
 
     name: str
     kind: Kind | None

@@ -1,7 +1,7 @@
 """Rigid transforms as (..., 4, 4) float64 arrays named by their frames: ``p_a = a_T_b @ p_b``.
 
-Every function is vectorised over leading axes. Metres and radians throughout. Twists are ``[phi, rho]``, rotation
-first; perturbations act from the left, in the parent frame: ``X_true = exp(xi) @ X_est``.
+Every function is vectorised over leading axes. Metres and radians throughout. Twists are ``[phi, rho]``,
+rotation first; perturbations act from the left, in the parent frame: ``X_true = exp(xi) @ X_est``.
 """
 
 from __future__ import annotations
@@ -44,7 +44,8 @@ def hat(v: ArrayLike) -> Array:
     v = np.asarray(v, float)
     x, y, z = v[..., 0], v[..., 1], v[..., 2]
     zero = np.zeros_like(x)
-    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1).reshape(*v.shape[:-1], 3, 3)
+    entries = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], -1)
+    return np.asarray(entries.reshape(*v.shape[:-1], 3, 3))
 
 
 def so3_exp(rotvec: ArrayLike) -> Array:
@@ -62,7 +63,7 @@ def so3_log(rotation: ArrayLike) -> Array:
 
 
 def left_jacobian(rotvec: ArrayLike) -> Array:
-    """V(phi) (..., 3, 3) of SO(3), with ``exp([phi, rho]).translation = V(phi) rho`` (Barfoot 2017, eq. 7.37)."""
+    """V(phi) (..., 3, 3): ``exp([phi, rho])`` has translation V(phi) rho (Barfoot 2017, eq. 7.37)."""
     rotvec = np.asarray(rotvec, float)
     angle = np.linalg.norm(rotvec, axis=-1)[..., None, None]
     small = angle < _SMALL_ANGLE_RAD
@@ -81,7 +82,7 @@ def exp(twist: ArrayLike) -> Array:
 
 
 def log(a_T_b: ArrayLike) -> Array:
-    """Twists (..., 6) = [phi rad, rho m] of transforms (..., 4, 4); the inverse of `exp` for angles below pi."""
+    """Twists (..., 6) = [phi rad, rho m] of transforms (..., 4, 4); inverts `exp` for angles below pi."""
     a_T_b = np.asarray(a_T_b, float)
     phi = so3_log(a_T_b[..., :3, :3])
     rho = np.linalg.solve(left_jacobian(phi), a_T_b[..., :3, 3:])[..., 0]
@@ -89,7 +90,7 @@ def log(a_T_b: ArrayLike) -> Array:
 
 
 def adjoint(a_T_b: ArrayLike) -> Array:
-    """Ad (..., 6, 6) with ``a_T_b @ exp(xi) = exp(Ad @ xi) @ a_T_b``: moves a twist from frame b to frame a."""
+    """Ad (..., 6, 6) with ``a_T_b @ exp(xi) = exp(Ad @ xi) @ a_T_b``: moves a twist from b to a."""
     a_T_b = np.asarray(a_T_b, float)
     rotation = a_T_b[..., :3, :3]
     ad = np.zeros((*a_T_b.shape[:-2], 6, 6))
@@ -99,7 +100,7 @@ def adjoint(a_T_b: ArrayLike) -> Array:
 
 
 def nearest_rotation(matrix: ArrayLike) -> Array:
-    """The proper rotations (..., 3, 3) nearest to matrices (..., 3, 3) in the Frobenius norm (Kabsch 1976)."""
+    """The proper rotations nearest to matrices (..., 3, 3) in the Frobenius norm (Kabsch 1976)."""
     u, _, vt = np.linalg.svd(np.asarray(matrix, float))
     u[..., :, 2] *= np.sign(np.linalg.det(u @ vt))[..., None]
     return np.asarray(u @ vt)
@@ -131,16 +132,15 @@ def translation_error_m(a_T_b: ArrayLike, a_T_c: ArrayLike) -> Array:
     return np.asarray(np.linalg.norm(difference, axis=-1))
 
 
-def is_transform(a_T_b: ArrayLike, tolerance: float = 1e-6) -> bool:
-    """Whether every (..., 4, 4) is finite, has a proper rotation and the last row 0 0 0 1, within the tolerance."""
+def is_transform(a_T_b: ArrayLike, tolerance: float = 1e-6) -> NDArray[np.bool_]:
+    """Whether each (..., 4, 4) is finite and has a proper rotation and the last row 0 0 0 1."""
     a_T_b = np.asarray(a_T_b, float)
-    if a_T_b.shape[-2:] != (4, 4) or not np.isfinite(a_T_b).all():
-        return False
-    rotation = a_T_b[..., :3, :3]
-    orthonormal = np.abs(rotation @ np.swapaxes(rotation, -1, -2) - np.eye(3)).max(initial=0.0) <= tolerance
-    proper = bool((np.linalg.det(rotation) > 0).all())
-    last_row = np.abs(a_T_b[..., 3, :] - [0, 0, 0, 1]).max(initial=0.0) <= tolerance
-    return bool(orthonormal and proper and last_row)
+    with np.errstate(invalid="ignore"):
+        rotation = a_T_b[..., :3, :3]
+        deviation = np.abs(rotation @ np.swapaxes(rotation, -1, -2) - np.eye(3)).max((-1, -2))
+        deviation = np.maximum(deviation, np.abs(a_T_b[..., 3, :] - [0, 0, 0, 1]).max(-1))
+        rigid = (deviation <= tolerance) & (np.linalg.det(rotation) > 0)
+    return np.asarray(rigid & np.isfinite(a_T_b).all((-1, -2)))
 
 
 def from_rotvec(rotvec: ArrayLike, translation: ArrayLike) -> Array:
@@ -156,7 +156,7 @@ def from_quat_xyzw(quaternion: ArrayLike, translation: ArrayLike) -> Array:
 
 
 def from_quat_wxyz(quaternion: ArrayLike, translation: ArrayLike) -> Array:
-    """Transforms of quaternions (..., 4) in the order w, x, y, z (Eigen, MuJoCo) and translations (..., 3) m."""
+    """Transforms of quaternions (..., 4) in the order w, x, y, z (MuJoCo) and translations (..., 3) m."""
     return from_quat_xyzw(np.roll(np.asarray(quaternion, float), -1, axis=-1), translation)
 
 

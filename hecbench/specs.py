@@ -1,4 +1,4 @@
-"""What a plugin declares about itself: a name, one sentence, what it needs, and how to build it when it is used."""
+"""What a plugin declares: a name, one sentence, what it needs, and how to build it when it is used."""
 
 from __future__ import annotations
 
@@ -44,16 +44,16 @@ class Need(StrEnum):
 
 
 class Solver(Protocol):
-    """A calibration method: a recording without its truth goes in, an estimate with its evidence comes out."""
+    """A calibration method: a recording without its truth goes in, an estimate with evidence comes out."""
 
     def __call__(self, recording: Recording, *, rng: np.random.Generator) -> Estimate:
-        """Answer, or raise `Refusal` (cannot on this recording) or `SolverFailure` (tried and knows it failed)."""
+        """Answer, or raise `Refusal` (cannot on this recording) or `SolverFailure` (tried, and failed)."""
         ...
 
 
 @dataclass(frozen=True, kw_only=True)
 class Spec:
-    """What every plugin has. `imports` are the importable modules without which it is `missing`, not broken."""
+    """What every plugin has. Without one of the modules `imports`, it is `missing`, not broken."""
 
     name: str
     summary: str
@@ -83,7 +83,7 @@ class DatasetSpec(Spec):
 
 @dataclass(frozen=True, kw_only=True)
 class SuiteSpec(Spec):
-    """Generated recordings. `make(level, index, seed)` depends on nothing else, so items stream in any order."""
+    """Generated recordings. `make(level, index, seed)` depends on nothing else: items stream in any order."""
 
     kind: ClassVar[Kind] = Kind.SUITE
     levels: tuple[str, ...]
@@ -115,7 +115,7 @@ class Evaluator(Protocol):
 
 @dataclass(frozen=True, kw_only=True)
 class EvaluatorSpec(Spec):
-    """A ruler. Its columns go into `estimate.errors` when it reads the truth, else into `estimate.held_out`."""
+    """A ruler. Its columns go to `estimate.errors` when it reads the truth, else to `estimate.held_out`."""
 
     kind: ClassVar[Kind] = Kind.EVALUATOR
     columns: tuple[Column, ...]
@@ -126,7 +126,7 @@ class EvaluatorSpec(Spec):
 
 @dataclass(frozen=True, kw_only=True)
 class ExporterSpec(Spec):
-    """A writer. `write(estimate, options)` returns the text; `options` are the strings given on the command line."""
+    """A writer. `write(estimate, options)` returns the text; `options` come from the command line."""
 
     kind: ClassVar[Kind] = Kind.EXPORTER
     suffix: str
@@ -151,7 +151,7 @@ class TranslatorSpec(Spec):
 
 @dataclass(frozen=True, kw_only=True)
 class DeviceSpec(Spec):
-    """A robot, gripper or camera. `open(options)` imports the SDK and connects; `options` are strings by name."""
+    """A robot, gripper or camera. `open(options)` imports the SDK and connects."""
 
     kind: Kind
     open: Callable[[Mapping[str, str]], Any]

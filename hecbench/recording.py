@@ -1,0 +1,353 @@
+"""What was measured: robot poses, observations of a target or of the robot, and how they were mounted."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields, replace
+from enum import StrEnum
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hecbench import se3
+from hecbench.errors import InputError, Refusal
+from hecbench.specs import Need
+from hecbench.targets import Target
+
+Array = NDArray[np.float64]
+Image = NDArray[np.uint8]
+ImageSource = Path | Image | None
+"""A file that is decoded when asked for, an array in memory, or nothing for this sample."""
+
+DISTORTION_LENGTHS = (0, 4, 5, 8, 12, 14)
+_ROTATION_TOLERANCE = 1e-3
+
+
+class Mounting(StrEnum):
+    """Where the camera sits: fixed beside the robot, or on its flange."""
+
+    EYE_TO_HAND = "eye_to_hand"
+    EYE_IN_HAND = "eye_in_hand"
+
+
+@dataclass(frozen=True, kw_only=True)
+class RobotDescription:
+    """The arm by name or URDF file, and the two links between which `base_T_flange` is given."""
+
+    model: str | None = None
+    urdf: Path | None = None
+    base_link: str = "base"
+    flange_link: str = "tool0"
+    joint_names: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class CameraModel:
+    """A pinhole camera in OpenCV's convention: pixel centres at integers, x right, y down, z forward.
+
+    Attributes:
+        width: of the image, px.
+        height: of the image, px.
+        K: (3, 3) px, or None when it is still to be calibrated from the images.
+        distortion: (0 | 4 | 5 | 8 | 12 | 14,) coefficients in OpenCV's order.
+    """
+
+    width: int
+    height: int
+    K: Array | None = None
+    distortion: Array = field(default_factory=lambda: np.zeros(0))
+
+    def __post_init__(self) -> None:
+        if self.width < 1 or self.height < 1:
+            raise InputError(
+                f"camera: size {self.width}x{self.height} is not positive; give the image's size in px"
+            )
+        if self.K is not None:
+            K = _finite("camera.K", self.K, (3, 3))
+            if K[0, 0] <= 0 or K[1, 1] <= 0 or K[1, 0] or (K[2] != [0, 0, 1]).any():
+                raise InputError("camera.K: expected [[fx, s, cx], [0, fy, cy], [0, 0, 1]] with fx, fy > 0")
+            if np.array_equal(K, np.eye(3)):
+                raise InputError("camera.K: is the identity; give the intrinsics in px, or null if unknown")
+            object.__setattr__(self, "K", K)
+        distortion = np.asarray(self.distortion, float).reshape(-1)
+        if len(distortion) not in DISTORTION_LENGTHS or not np.isfinite(distortion).all():
+            raise InputError(
+                f"camera.distortion: {len(distortion)} numbers; give {DISTORTION_LENGTHS} finite ones"
+            )
+        object.__setattr__(self, "distortion", distortion)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Recording:
+    """N samples as a struct of arrays; a NaN row says that the sample lacks this quantity.
+
+    Attributes:
+        name: of the recording.
+        mounting: where the camera sits; decides what "parent" means (`parent_link`).
+        sample_ids: N names.
+        robot: None for pose-only recordings.
+        camera: None when only `camera_T_target` is used.
+        target: None for markerless recordings.
+        initial_parent_T_camera: (4, 4) start, or None.
+        truth_parent_T_camera: (4, 4), or None; solvers get a copy without it.
+        base_T_flange: (N, 4, 4) m.
+        joints_rad: (N, J).
+        camera_T_target: (N, 4, 4) m.
+        corners_px: (N, P, 2), one row per target point.
+        robot_stamp_s, camera_stamp_s: (N,).
+        images: N sources of (height, width, 3) RGB.
+        masks: N sources of (height, width), above 127 = robot.
+        folder: where it was read from, None when generated.
+    """
+
+    name: str
+    mounting: Mounting
+    sample_ids: tuple[str, ...]
+    robot: RobotDescription | None = None
+    camera: CameraModel | None = None
+    target: Target | None = None
+    initial_parent_T_camera: Array | None = None
+    truth_parent_T_camera: Array | None = None
+    base_T_flange: Array | None = None
+    joints_rad: Array | None = None
+    camera_T_target: Array | None = None
+    corners_px: Array | None = None
+    robot_stamp_s: Array | None = None
+    camera_stamp_s: Array | None = None
+    images: tuple[ImageSource, ...] | None = None
+    masks: tuple[ImageSource, ...] | None = None
+    folder: Path | None = None
+
+    def __post_init__(self) -> None:
+        if not self.sample_ids:
+            raise InputError("samples: there are none; a recording needs at least one")
+        if len(set(self.sample_ids)) != len(self.sample_ids):
+            raise InputError("samples: two have the same id; make the ids unique")
+        for name in ("initial_parent_T_camera", "truth_parent_T_camera"):
+            if (pose := getattr(self, name)) is not None:
+                self._put(name, _rigid(_finite(name, pose, (4, 4))[None], name)[0])
+        for name in ("base_T_flange", "camera_T_target"):
+            if (poses := self._per_sample(name, (4, 4))) is not None:
+                self._put(name, _rigid(poses, f"samples[{{}}].{name}"))
+        joint_count = np.shape(self.joints_rad)[-1] if self.joints_rad is not None else 0
+        self._put("joints_rad", self._per_sample("joints_rad", (joint_count,)))
+        if self.robot and self.robot.joint_names and self.joints_rad is not None:
+            declared = len(self.robot.joint_names)
+            if joint_count != declared:
+                raise InputError(
+                    f"samples[0].joints_rad: {joint_count} numbers for {declared} robot.joint_names"
+                )
+        for name in ("robot_stamp_s", "camera_stamp_s"):
+            self._put(name, self._per_sample(name, ()))
+        self._check_corners()
+        for name in ("images", "masks"):
+            if (sources := getattr(self, name)) is not None and len(sources) != len(self):
+                raise InputError(f"{name}: {len(sources)} for {len(self)} samples")
+        self._check_every_sample_has_a_robot_pose()
+
+    def _per_sample(self, name: str, shape: tuple[int, ...]) -> Array | None:
+        """The array of that name with N rows; rows are finite or wholly NaN, all-NaN arrays None."""
+        if (value := getattr(self, name)) is None:
+            return None
+        array = np.asarray(value, float)
+        if array.shape != (len(self), *shape):
+            raise InputError(
+                f"{name}: shape {array.shape}, expected {(len(self), *shape)}, one row per sample"
+            )
+        finite = np.isfinite(array.reshape(len(self), -1))
+        for i in np.flatnonzero(finite.any(1) & ~finite.all(1)):
+            raise InputError(
+                f"samples[{i}].{name}: holds a number that is not finite; correct or leave it out"
+            )
+        return array if finite.any() else None
+
+    def _put(self, name: str, value: Array | None) -> None:
+        object.__setattr__(self, name, value)
+
+    def _check_corners(self) -> None:
+        if self.corners_px is None:
+            return
+        if self.target is None:
+            raise InputError("samples[0].corners_px: given without a target; describe the target")
+        corners = np.asarray(self.corners_px, float)
+        expected = (len(self), len(self.target.points_m), 2)
+        if corners.shape != expected:
+            raise InputError(
+                f"corners_px: shape {corners.shape}, expected {expected}: one row per target point"
+            )
+        if np.isinf(corners).any() or (np.isnan(corners[..., 0]) != np.isnan(corners[..., 1])).any():
+            raise InputError("corners_px: holds a number that is not finite; use null for a point not seen")
+        self._put("corners_px", corners if np.isfinite(corners).any() else None)
+
+    def _check_every_sample_has_a_robot_pose(self) -> None:
+        known = np.zeros(len(self), bool)
+        for array in (self.base_T_flange, self.joints_rad):
+            if array is not None:
+                known |= np.isfinite(array.reshape(len(self), -1)).all(1)
+        for i in np.flatnonzero(~known):
+            raise InputError(f"samples[{i}]: has neither base_T_flange nor joints_rad; give at least one")
+
+    def __len__(self) -> int:
+        return len(self.sample_ids)
+
+    @property
+    def parent_link(self) -> str:
+        """The link the answer is given in: the base (eye_to_hand) or the flange (eye_in_hand)."""
+        if self.mounting is Mounting.EYE_TO_HAND:
+            return self.robot.base_link if self.robot else "base"
+        return self.robot.flange_link if self.robot else "flange"
+
+    def hand_poses(self) -> Array:
+        """H (N, 4, 4) m, NaN rows where absent, that folds both mountings into one model.
+
+        H is base_T_flange (eye_to_hand) or flange_T_base (eye_in_hand), so that with the answer
+        X = parent_T_camera and the constant Y = other_T_target: ``camera_T_target = inverse(X) @ H @ Y``.
+
+        Raises:
+            Refusal: no sample has base_T_flange.
+        """
+        if self.base_T_flange is None:
+            raise Refusal("no sample has base_T_flange, and the robot model that would give it is unknown")
+        return (
+            self.base_T_flange if self.mounting is Mounting.EYE_TO_HAND else se3.inverse(self.base_T_flange)
+        )
+
+    def offers(self) -> frozenset[Need]:
+        """What this recording has of the things that solvers ask for."""
+        has_intrinsics = self.camera is not None and self.camera.K is not None
+        has_corners = self.corners_px is not None
+        has = {
+            Need.CORNERS: has_corners,
+            Need.INTRINSICS: has_intrinsics,
+            Need.TARGET_POSES: self.camera_T_target is not None or (has_corners and has_intrinsics),
+            Need.IMAGES: self.images is not None and any(image is not None for image in self.images),
+            Need.MASKS: self.masks is not None and any(mask is not None for mask in self.masks),
+            Need.JOINTS: self.joints_rad is not None,
+            Need.ROBOT_MODEL: self.robot is not None and (self.robot.model or self.robot.urdf) is not None,
+            Need.INITIAL: self.initial_parent_T_camera is not None,
+        }
+        return frozenset(need for need, present in has.items() if present)
+
+    def subset(self, indices: Sequence[int] | NDArray[np.integer]) -> Recording:
+        """The same recording with only these samples, in this order."""
+        order = np.asarray(indices, int)
+        changes: dict[str, Any] = {"sample_ids": tuple(self.sample_ids[i] for i in order.tolist())}
+        for name in _PER_SAMPLE_ARRAYS:
+            if (array := getattr(self, name)) is not None:
+                changes[name] = array[order]
+        for name in ("images", "masks"):
+            if (sources := getattr(self, name)) is not None:
+                changes[name] = tuple(sources[i] for i in order.tolist())
+        return replace(self, **changes)
+
+    def without_truth(self) -> Recording:
+        """The copy that solvers get."""
+        return replace(self, truth_parent_T_camera=None)
+
+    def image(self, index: int) -> Image:
+        """Decode one image, (height, width, 3) RGB.
+
+        Raises:
+            InputError: it is absent, unreadable, or not of the camera's size.
+        """
+        return self._picture("images", index, "RGB")
+
+    def mask(self, index: int) -> NDArray[np.bool_]:
+        """Decode one mask, (height, width), True on the robot.
+
+        Raises:
+            InputError: it is absent, unreadable, or not of the camera's size.
+        """
+        return self._picture("masks", index, "L") > 127
+
+    def _picture(self, name: str, index: int, mode: str) -> Image:
+        sources = getattr(self, name)
+        source = sources[index] if sources else None
+        where = f"samples[{index}].{name.removesuffix('s')}"
+        if source is None:
+            raise InputError(f"{self.name}: {where}: there is none")
+        picture = _decode(source, mode) if isinstance(source, Path) else source
+        if self.camera and picture.shape[:2] != (self.camera.height, self.camera.width):
+            height, width = picture.shape[:2]
+            raise InputError(
+                f"{self.name}: {where}: is {width}x{height} px, but the camera is "
+                f"{self.camera.width}x{self.camera.height}; correct camera.width, height and K together"
+            )
+        return picture
+
+    @cached_property
+    def sha256(self) -> str:
+        """Digest of the content: every array and description, and the bytes of the image files that exist."""
+        digest = hashlib.sha256()
+        for item in fields(self):
+            value = getattr(self, item.name)
+            if item.name != "folder" and value is not None:
+                digest.update(item.name.encode())
+                _update(digest, value)
+        return digest.hexdigest()
+
+
+_PER_SAMPLE_ARRAYS = (
+    "base_T_flange",
+    "joints_rad",
+    "camera_T_target",
+    "corners_px",
+    "robot_stamp_s",
+    "camera_stamp_s",
+)
+
+
+def _finite(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
+    array = np.asarray(value, float)
+    if array.shape != shape or not np.isfinite(array).all():
+        raise InputError(
+            f"{name}: expected {'x'.join(map(str, shape))} finite numbers, found shape {array.shape}"
+        )
+    return array
+
+
+def _rigid(poses: Array, name: str) -> Array:
+    """Check transforms (N, 4, 4), NaN rows allowed, and move rounded rotations onto SO(3).
+
+    `name` is for errors; its {} stands for the sample's index.
+    """
+    given = ~np.isnan(poses).all((1, 2))
+    for i in np.flatnonzero(given & ~se3.is_transform(poses, _ROTATION_TOLERANCE)):
+        raise InputError(
+            f"{name.format(i)}: is not a rigid transform; write a row-major 4x4 with an orthonormal, "
+            "right-handed rotation, metres, and the last row 0 0 0 1"
+        )
+    rounded = given & ~se3.is_transform(poses, 1e-9)
+    if rounded.any():
+        poses = poses.copy()
+        poses[rounded, :3, :3] = se3.nearest_rotation(poses[rounded, :3, :3])
+    return poses
+
+
+def _decode(path: Path, mode: str) -> Image:
+    from PIL import Image as PillowImage
+
+    try:
+        with PillowImage.open(path) as picture:
+            return np.asarray(picture.convert(mode))
+    except (OSError, SyntaxError, ValueError) as error:  # Pillow raises all three on damaged files
+        raise InputError(f"{path}: cannot be read as an image ({error}); restore the file") from error
+
+
+def _update(digest: Any, value: Any) -> None:
+    if isinstance(value, np.ndarray):
+        digest.update(str(value.shape).encode() + np.ascontiguousarray(value).tobytes())
+    elif isinstance(value, Path):
+        digest.update(value.read_bytes() if value.is_file() else value.name.encode())
+    elif isinstance(value, tuple):
+        for part in value:
+            _update(digest, part)
+    elif hasattr(value, "__dataclass_fields__"):
+        for item in fields(value):
+            _update(digest, getattr(value, item.name))
+    else:
+        digest.update(repr(value).encode())

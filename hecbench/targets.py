@@ -1,0 +1,137 @@
+"""Calibration targets as points in their own frame (m); a recording's `corners_px` has one row per point."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hecbench.errors import InputError
+
+Array = NDArray[np.float64]
+
+
+class Target:
+    """Any target: its `kind` as recordings spell it, and its points (P, 3) m."""
+
+    kind: ClassVar[str]
+
+    @cached_property
+    def points_m(self) -> Array:
+        """(P, 3) m in the target's frame."""
+        raise NotImplementedError
+
+    @property
+    def is_planar(self) -> bool:
+        """Whether all points have z = 0."""
+        return bool((self.points_m[:, 2] == 0).all())
+
+
+@dataclass(frozen=True)
+class PointsTarget(Target):
+    """Points given one by one; `coordinates_m` is a tuple of (x, y, z)."""
+
+    kind: ClassVar[str] = "points"
+    coordinates_m: tuple[tuple[float, ...], ...]
+
+    def __post_init__(self) -> None:
+        if not self.coordinates_m or any(len(point) != 3 for point in self.coordinates_m):
+            raise InputError("target.points_m: expected a non-empty list of [x, y, z]")
+        if not np.isfinite(self.points_m).all():
+            raise InputError("target.points_m: holds a number that is not finite")
+
+    @cached_property
+    def points_m(self) -> Array:
+        """(P, 3) m in the target's frame."""
+        return np.array(self.coordinates_m, float)
+
+    @classmethod
+    def of(cls, points_m: ArrayLike) -> PointsTarget:
+        """From an array (P, 3) m."""
+        return cls(tuple(tuple(point) for point in np.asarray(points_m, float).tolist()))
+
+
+@dataclass(frozen=True)
+class ChessboardTarget(Target):
+    """Inner corners row by row, x along columns, z = 0."""
+
+    kind: ClassVar[str] = "chessboard"
+    columns: int
+    rows: int
+    square_m: float
+
+    def __post_init__(self) -> None:
+        _at_least("columns", self.columns, 2)
+        _at_least("rows", self.rows, 2)
+        _positive("square_m", self.square_m)
+
+    @cached_property
+    def points_m(self) -> Array:
+        """(columns * rows, 3) m in the board's frame."""
+        return _grid(self.columns, self.rows, self.square_m)
+
+
+@dataclass(frozen=True)
+class CharucoTarget(Target):
+    """Inner corners of a board of columns x rows squares, row by row, x along columns, z = 0."""
+
+    kind: ClassVar[str] = "charuco"
+    columns: int
+    rows: int
+    square_m: float
+    marker_m: float
+    dictionary: str
+    legacy: bool = False
+
+    def __post_init__(self) -> None:
+        _at_least("columns", self.columns, 2)
+        _at_least("rows", self.rows, 2)
+        _positive("square_m", self.square_m)
+        _positive("marker_m", self.marker_m)
+        if self.marker_m >= self.square_m:
+            raise InputError(
+                f"target.marker_m: {self.marker_m} must be smaller than square_m {self.square_m}"
+            )
+
+    @cached_property
+    def points_m(self) -> Array:
+        """((columns - 1) * (rows - 1), 3) m: the first inner corner lies at (square_m, square_m, 0)."""
+        inner = _grid(self.columns - 1, self.rows - 1, self.square_m)
+        return np.add(inner, [self.square_m, self.square_m, 0.0])
+
+
+@dataclass(frozen=True)
+class AprilTagTarget(Target):
+    """The official tag frame (x right, y down, z into the tag); corners from bottom-left to top-left."""
+
+    kind: ClassVar[str] = "apriltag"
+    family: str
+    id: int
+    size_m: float
+
+    def __post_init__(self) -> None:
+        _positive("size_m", self.size_m)
+
+    @cached_property
+    def points_m(self) -> Array:
+        """(4, 3) m in the tag's frame."""
+        half = self.size_m / 2
+        return np.array([[-half, half, 0], [half, half, 0], [half, -half, 0], [-half, -half, 0]])
+
+
+def _grid(columns: int, rows: int, spacing_m: float) -> Array:
+    y, x = np.mgrid[:rows, :columns]
+    return np.stack([x.ravel(), y.ravel(), np.zeros(rows * columns)], 1) * spacing_m
+
+
+def _positive(name: str, value: float) -> None:
+    if not (np.isfinite(value) and value > 0):
+        raise InputError(f"target.{name}: {value} is not a positive length in metres")
+
+
+def _at_least(name: str, value: int, least: int) -> None:
+    if value < least:
+        raise InputError(f"target.{name}: {value} is below {least}")
