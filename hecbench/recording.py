@@ -102,6 +102,7 @@ class Recording:
         images: N sources of (height, width, 3) RGB.
         masks: N sources of (height, width), above 127 = robot.
         folder: where it was read from, None when generated.
+        notes: what its importer found out about its conventions, to be said to the user; not saved.
     """
 
     name: str
@@ -121,6 +122,7 @@ class Recording:
     images: tuple[ImageSource, ...] | None = None
     masks: tuple[ImageSource, ...] | None = None
     folder: Path | None = None
+    notes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.sample_ids:
@@ -285,7 +287,7 @@ class Recording:
         digest = hashlib.sha256()
         for item in fields(self):
             value = getattr(self, item.name)
-            if item.name != "folder" and value is not None:
+            if item.name not in ("folder", "notes") and value is not None:
                 digest.update(item.name.encode())
                 _update(digest, value)
         return digest.hexdigest()
