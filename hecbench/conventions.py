@@ -208,9 +208,7 @@ def prove(
     candidates = list(_candidates(robot, target, mountings))
     documented = [c for c in candidates if c.deviations == 0]
     if count < _LEAST_SAMPLES and len(documented) == 1:
-        return _proof(
-            documented[0], f"{source}: read as {_named(documented[0])}; too few samples to prove it"
-        )
+        return _proof(documented[0], f"{source}: read as {documented[0].name}; too few samples to prove it")
     limit = min(_STILL, _CLEARLY_WORSE * min(c.stillness.relative for c in candidates) + 0.01)
     still = [c for c in candidates if c.stillness.relative <= limit]
     fitting = [c for c in still if c.deviations == min(s.deviations for s in still)]
@@ -222,19 +220,18 @@ def prove(
             f"{'; '.join(map(str, fitting[:6]))}; say which is meant in {HINTS_NAME} beside it"
         )
     if fitting:
-        note = (
-            f"{source}: read as {_named(fitting[0])}, which holds the target still to {fitting[0].stillness}"
-        )
-        if fitting[0].deviations and documented:
+        best = fitting[0]
+        note = f"{source}: read as {best.name}, which holds the target still to {best.stillness}"
+        if not best.sees_target:
+            note += " but puts it behind the camera"
+        if best.deviations and documented:
             usual = min(documented, key=lambda c: c.stillness.relative)
             note += f"; the documented reading does not: {usual}"
         return _proof(best, note)
     ranked = sorted(candidates, key=lambda c: c.stillness.relative)
     if len(documented) == 1:
-        note = f"{source}: read as documented, {documented[0]}; no reading holds the target still"
-        return _proof(
-            documented[0], note + f", the best is {ranked[0]}: pairs mixed up, or too little motion?"
-        )
+        note = f"{source}: read as documented, {documented[0]}; no reading holds the target still, "
+        return _proof(documented[0], note + f"the best is {ranked[0]}: pairs mixed up, or too little motion?")
     raise InputError(
         f"{source}: no reading holds the target still; the best are {'; '.join(map(str, ranked[:3]))}; "
         f"check the pairing of robot and target poses, or say how to read them in {HINTS_NAME} beside it"
