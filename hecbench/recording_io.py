@@ -131,7 +131,7 @@ def load(path: Path) -> Recording:
 
 def _build(parsed: _Recording, folder: Path) -> Recording:
     from_file = _read_arrays(folder / ARRAYS_NAME, len(parsed.samples))
-    arrays = {name: _stack(name, shape, parsed.samples) for name, shape in _ARRAYS.items()}
+    arrays: dict[str, Any] = {name: _stack(name, shape, parsed.samples) for name, shape in _ARRAYS.items()}
     for name in from_file:
         if arrays[name] is not None:
             raise InputError(f"samples[].{name}: stands in {ARRAYS_NAME} too; keep one of the two")

@@ -36,7 +36,7 @@ def inverse(a_T_b: ArrayLike) -> Array:
 def transform_points(a_T_b: ArrayLike, points_b: ArrayLike) -> Array:
     """Points (..., P, 3) of frame b in frame a, for transforms (..., 4, 4)."""
     a_T_b, points_b = np.asarray(a_T_b, float), np.asarray(points_b, float)
-    return points_b @ np.swapaxes(a_T_b[..., :3, :3], -1, -2) + a_T_b[..., None, :3, 3]
+    return np.asarray(points_b @ np.swapaxes(a_T_b[..., :3, :3], -1, -2) + a_T_b[..., None, :3, 3])
 
 
 def hat(v: ArrayLike) -> Array:

@@ -66,12 +66,18 @@ class PosePairs:
 def pose_pairs(recording: Recording) -> PosePairs:
     """The samples with a hand pose and a target pose, once they are known to determine X.
 
+    They are sorted by hand pose, whatever order they were taken in: the motions of a pair and of its reverse
+    weigh translation noise differently, so methods on motions would otherwise depend on the order of the
+    samples.
+
     Raises:
         Refusal: too few samples, or the hand does not rotate about two axes.
     """
     hand, camera_T_target = recording.hand_poses(), target_poses(recording)
     both = np.isfinite(hand).all((1, 2)) & np.isfinite(camera_T_target).all((1, 2))
-    pairs = PosePairs(hand[both], camera_T_target[both])
+    hand, camera_T_target = hand[both], camera_T_target[both]
+    order = np.lexsort(hand[:, :3].reshape(len(hand), -1).T)
+    pairs = PosePairs(hand[order], camera_T_target[order])
     require_two_rotation_axes(pairs)
     return pairs
 
@@ -101,7 +107,7 @@ def require_two_rotation_axes(pairs: PosePairs) -> None:
             )
         if second < MINIMUM_ROTATION_DEG:
             raise Refusal(
-                f"the {name} rotates about one axis only ({first:.3g} deg rms, {second:.2g} about any other): "
+                f"the {name} rotates about one axis only ({first:.3g} deg rms, {second:.2g} about others): "
                 "add samples turned about a second axis"
             )
 

@@ -1,0 +1,286 @@
+"""Plan = recordings x solvers -> estimates with their errors, one recording after the other or in parallel.
+"""
+
+from __future__ import annotations
+
+import sys
+import traceback
+import zlib
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from hecbench import __version__, registry, store
+from hecbench.errors import HecbenchError, InputError, Refusal, SolverFailure
+from hecbench.estimate import Estimate, Status, Termination
+from hecbench.recording import Recording
+from hecbench.robot import load_robot
+from hecbench.specs import DatasetSpec, EvaluatorSpec, Kind, Need, SolverSpec, SuiteSpec
+
+_HOW_TO_GIVE = {
+    Need.TARGET_POSES: "samples[].camera_T_target, or corners_px with target and camera.K",
+    Need.CORNERS: "samples[].corners_px",
+    Need.INTRINSICS: "camera.K",
+    Need.IMAGES: "samples[].image",
+    Need.MASKS: "samples[].mask",
+    Need.JOINTS: "samples[].joints_rad",
+    Need.ROBOT_MODEL: "robot.model or robot.urdf",
+    Need.INITIAL: "initial_parent_T_camera",
+}
+
+
+@dataclass(frozen=True)
+class Options:
+    """What holds for a whole run.
+
+    Attributes:
+        seed: of every random choice.
+        held_out: whether to refit on folds; None: only without truth, and not for slow solvers.
+        command: the command line, for the provenance.
+        stop_on_bad_input: raise when a solver finds a damaged image, instead of reporting it as a failure.
+    """
+
+    seed: int = 0
+    held_out: bool | None = None
+    command: str = ""
+    stop_on_bad_input: bool = True
+
+
+def load_recording(path: Path) -> Recording:
+    """Read a recording of any format whose adapter recognises it.
+
+    Raises:
+        InputError: nothing there, no adapter or several recognise it, or the adapter finds a fault.
+    """
+    if not path.exists():
+        raise InputError(f"{path}: does not exist; give a recording's folder")
+    adapters = registry.load().ready(Kind.DATASET, DatasetSpec)
+    found = [adapter for adapter in adapters if adapter.sniff(path)]
+    if not found:
+        known = "; ".join(f"{adapter.name}: {adapter.summary}" for adapter in adapters)
+        raise InputError(f"{path}: is no known recording. Known are {known}")
+    if len(found) > 1:
+        names = ", ".join(adapter.name for adapter in found)
+        raise InputError(f"{path}: could be {names}; name one with `hecbench import --format`")
+    return found[0].load(path)
+
+
+def with_robot_poses(recording: Recording) -> Recording:
+    """Fill a missing base_T_flange from the joints by the robot model's forward kinematics, where both are
+    known.
+    """
+    robot, joints_rad = recording.robot, recording.joints_rad
+    lacks_all = recording.base_T_flange is None
+    if not lacks_all or joints_rad is None or robot is None or not (robot.model or robot.urdf):
+        return recording
+    base_T_flange = np.full((len(recording), 4, 4), np.nan)
+    known = np.isfinite(joints_rad).all(1)
+    model = load_robot(robot.urdf or str(robot.model), meshes=False)
+    base_T_flange[known] = model.forward(
+        joints_rad[known], robot.joint_names or None, base=robot.base_link, tip=robot.flange_link
+    )
+    return replace(recording, base_T_flange=base_T_flange)
+
+
+def solve(recording: Recording, specs: Iterable[SolverSpec], options: Options = Options()) -> list[Estimate]:
+    """One estimate of each solver, in the order given, with errors and held-out residuals."""
+    origin = _provenance(recording, options)
+    recording = with_robot_poses(recording)
+    blind = recording.without_truth()
+    estimates = []
+    for spec in specs:
+        answer = _solve_blind(blind, spec, options)
+        errors, held_out = _measure(answer, recording, blind, spec, options)
+        estimates.append(replace(answer, errors=errors, held_out=held_out, provenance=origin))
+    return estimates
+
+
+def _provenance(recording: Recording, options: Options) -> dict[str, Any]:
+    return {
+        "hecbench": __version__,
+        "recording_sha256": recording.sha256,
+        "seed": options.seed,
+        "command": options.command,
+        "versions": _versions(),
+    }
+
+
+def _solve_blind(blind: Recording, spec: SolverSpec, options: Options) -> Estimate:
+    """Run one solver and turn every way it can end into an estimate."""
+    missing = [need for need in Need if need in spec.needs - blind.offers()]
+    if missing:
+        wanted = "; ".join(f"{need} ({_HOW_TO_GIVE[need]})" for need in missing)
+        return _unanswered(blind, spec, Status.REFUSED, f"the recording lacks {wanted}", 0.0)
+    solver = spec.factory()
+    rng = np.random.default_rng([options.seed, zlib.crc32(spec.name.encode())])
+    start = perf_counter()
+    try:
+        estimate = solver(blind, rng=rng)
+    except Refusal as refusal:
+        return _unanswered(blind, spec, Status.REFUSED, str(refusal), perf_counter() - start)
+    except SolverFailure as failure:
+        return _unanswered(blind, spec, Status.FAILED, str(failure), perf_counter() - start)
+    except InputError as error:
+        if options.stop_on_bad_input:
+            raise
+        return _unanswered(blind, spec, Status.FAILED, str(error), perf_counter() - start)
+    except Exception as error:
+        reason = f"crashed with {type(error).__name__}: {error} ({_place(error)})"
+        return _unanswered(blind, spec, Status.FAILED, reason, perf_counter() - start)
+    return _labelled(estimate, blind, spec, perf_counter() - start)
+
+
+def _place(error: BaseException) -> str:
+    frame = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{Path(frame.filename).name}:{frame.lineno}"
+
+
+def _unanswered(blind: Recording, spec: SolverSpec, status: Status, reason: str, seconds: float) -> Estimate:
+    ended = Termination.NOT_RUN if status is Status.REFUSED else Termination.STALLED
+    return _labelled(Estimate(status=status, reason=reason, termination=ended), blind, spec, seconds)
+
+
+def _labelled(estimate: Estimate, blind: Recording, spec: SolverSpec, seconds: float) -> Estimate:
+    return replace(
+        estimate,
+        solver=spec.name,
+        recording=blind.name,
+        mounting=blind.mounting,
+        parent_link=blind.parent_link,
+        camera=estimate.camera or blind.camera,
+        seconds=seconds,
+    )
+
+
+def _measure(
+    estimate: Estimate, recording: Recording, blind: Recording, spec: SolverSpec, options: Options
+) -> tuple[dict[str, Any] | None, dict[str, Any] | None]:
+    """The errors against the truth and the held-out residuals, None where not asked for or not possible."""
+    has_truth = recording.truth_parent_T_camera is not None
+    wants_folds = options.held_out if options.held_out is not None else not (has_truth or spec.slow)
+    measured: dict[bool, dict[str, Any]] = {True: {}, False: {}}
+    for evaluator in registry.load().ready(Kind.EVALUATOR, EvaluatorSpec):
+        if estimate.status is not Status.OK or not evaluator.applies(recording):
+            continue
+        if evaluator.reads_truth or wants_folds:
+            measured[evaluator.reads_truth] |= evaluator.factory()(
+                estimate,
+                recording if evaluator.reads_truth else blind,
+                solve=lambda part: _solve_blind(part, spec, options),
+                rng=np.random.default_rng([options.seed, zlib.crc32(evaluator.name.encode())]),
+            )
+    return measured[True] or None, measured[False] or None
+
+
+@cache
+def _versions() -> dict[str, str]:
+    from importlib import metadata
+
+    python = f"{sys.version_info.major}.{sys.version_info.minor}.{sys.version_info.micro}"
+    names = ("numpy", "scipy", "numba", "opencv-contrib-python-headless")
+    return {"python": python} | {name: metadata.version(name) for name in names}
+
+
+def best_first(estimates: Sequence[Estimate]) -> list[Estimate]:
+    """Sorted by tre_mm where there is truth, else by held-out prediction; those without an answer last."""
+
+    def score(estimate: Estimate) -> tuple[int, float]:
+        held_out, errors = estimate.held_out or {}, estimate.errors or {}
+        for value in (
+            errors.get("tre_mm"),
+            errors.get("translation_error_mm"),
+            held_out.get("reprojection_px"),
+            held_out.get("target_mm"),
+        ):
+            if value is not None:
+                return 0, value
+        return (1 if estimate.status is Status.OK else 2), 0.0
+
+    return sorted(estimates, key=score)
+
+
+@dataclass(frozen=True)
+class Task:
+    """One recording, from disk or from a suite, and the solvers to run on it."""
+
+    solvers: tuple[str, ...]
+    path: Path | None = None
+    suite: str | None = None
+    level: str | None = None
+    index: int = 0
+
+    def recording(self, seed: int) -> Recording:
+        """Load or generate it."""
+        if self.path is not None:
+            return load_recording(self.path)
+        suite = registry.load().get(Kind.SUITE, str(self.suite), SuiteSpec)
+        return suite.make(str(self.level), self.index, seed)
+
+    @property
+    def item(self) -> str:
+        """The recording's path, or its number in the level."""
+        return str(self.path) if self.path is not None else f"{self.index:06d}"
+
+
+def execute(task: Task, options: Options) -> list[Estimate]:
+    """Run one task; the unit of parallel work."""
+    specs = [registry.load().get(Kind.SOLVER, name, SolverSpec) for name in task.solvers]
+    estimates = solve(task.recording(options.seed), specs, options)
+    return [replace(e, suite=task.suite or "files", level=task.level, item=task.item) for e in estimates]
+
+
+def remaining(tasks: Iterable[Task], done: Iterable[Estimate], options: Options) -> list[Task]:
+    """The tasks without the solvers that already have a result of the same place, content and seed."""
+    finished = {store.key(estimate)[:3] + store.key(estimate)[4:] for estimate in done}
+    contents = {store.key(estimate)[3] for estimate in done}
+
+    def missing(task: Task) -> tuple[str, ...]:
+        place = task.suite or "files", task.level, task.item
+        if task.path is not None and contents and load_recording(task.path).sha256 not in contents:
+            return task.solvers
+        return tuple(s for s in task.solvers if (*place, s, options.seed) not in finished)
+
+    pruned = (replace(task, solvers=missing(task)) for task in tasks)
+    return [task for task in pruned if task.solvers]
+
+
+def run(
+    tasks: Sequence[Task],
+    options: Options,
+    *,
+    out: Path,
+    jobs: int = 1,
+    resume: bool = False,
+    on_result: Callable[[list[Estimate]], None] = lambda estimates: None,
+) -> store.Contents:
+    """Run the tasks into a store; what is finished is on disk at once, so an interrupted run goes on with
+    `resume`.
+
+    Raises:
+        InputError: a recording cannot be read, or the store is in use or not empty.
+        HecbenchError: the store cannot be written.
+    """
+    with store.writing(out, resume=resume) as writer:
+        done = store.read(out).estimates
+        for estimates in _executed(remaining(tasks, done, options), options, jobs):
+            writer.append(estimates)
+            on_result(estimates)
+    return store.read(out)
+
+
+def _executed(tasks: Sequence[Task], options: Options, jobs: int) -> Iterator[list[Estimate]]:
+    if jobs == 1 or len(tasks) < 2:
+        yield from (execute(task, options) for task in tasks)
+        return
+    from joblib import Parallel, delayed
+
+    try:
+        parallel = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size="auto")
+        yield from parallel(delayed(execute)(task, options) for task in tasks)
+    except ValueError as error:
+        raise HecbenchError(f"--jobs {jobs}: {error}") from error

@@ -1,0 +1,129 @@
+"""How well a calibration predicts samples it has not seen: the ruler for recordings without truth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hecbench import se3, statistics
+from hecbench.errors import Refusal
+from hecbench.estimate import Estimate, Status
+from hecbench.recording import Recording
+from hecbench.registry import hookimpl
+from hecbench.specs import Column, EvaluatorSpec, Need
+from hecbench_plugins.target_poses import project, target_poses
+
+Array = NDArray[np.float64]
+
+FOLDS = 5
+_COLUMNS = (Column("reprojection_px", "px"), Column("target_mm", "mm"), Column("target_deg", "deg"))
+
+
+def held_out(
+    estimate: Estimate,
+    recording: Recording,
+    *,
+    solve: Callable[[Recording], Estimate],
+    rng: np.random.Generator,
+) -> Mapping[str, Any]:
+    """Prediction of left-out samples, 5-fold by sample, rms with its bootstrap interval, and the median.
+
+    X is the solver's on the training folds. The ruler itself refits Y = other_T_target there with the raw
+    robot poses, identically for every solver, and predicts ``inverse(X) @ H @ Y`` for the left-out samples. A
+    fold on which the solver gives no answer is counted in `failed_folds` and predicts nothing.
+    """
+    try:
+        recording = replace(recording, camera_T_target=target_poses(recording))
+        hand = recording.hand_poses()
+    except Refusal as refusal:
+        return {"reason": str(refusal)}
+    assert recording.camera_T_target is not None
+    usable = np.flatnonzero(
+        np.isfinite(hand).all((1, 2)) & np.isfinite(recording.camera_T_target).all((1, 2))
+    )
+    residuals: list[Array] = []
+    failed = 0
+    folds = np.array_split(rng.permutation(usable), min(FOLDS, len(usable)))
+    for fold in folds:
+        training = np.setdiff1d(usable, fold)
+        fitted = solve(recording.subset(training)) if len(training) else None
+        if fitted is None or fitted.status is not Status.OK:
+            failed += 1
+            continue
+        assert fitted.parent_T_camera is not None
+        other_T_target = refit_target(fitted.parent_T_camera, recording.subset(training))
+        residuals += [_residuals(fitted.parent_T_camera, other_T_target, recording, i) for i in fold.tolist()]
+    found: dict[str, Any] = {"folds": len(folds), "failed_folds": failed, "samples": len(residuals)}
+    for name, values in zip(
+        ("reprojection_px", "target_mm", "target_deg"), np.array(residuals).T, strict=False
+    ):
+        if np.isfinite(values).all():
+            rms = statistics.bootstrap(values, statistics.root_mean_square)
+            found[name] = rms.value
+            found[f"{name}_interval"] = [rms.low, rms.high]
+            found[f"{name}_median"] = float(np.median(values))
+    return found
+
+
+def refit_target(parent_T_camera: Array, recording: Recording) -> Array:
+    """Y (4, 4) given X: least reprojection error where there are corners, else the mean of what samples see."""
+    from scipy.optimize import least_squares
+
+    hand = recording.hand_poses()
+    assert recording.camera_T_target is not None
+    start = se3.mean(se3.inverse(hand) @ parent_T_camera @ recording.camera_T_target)
+    if not _has_pixels(recording):
+        return start
+    assert recording.corners_px is not None
+    assert recording.camera is not None
+    assert recording.target is not None
+    camera, points_m = recording.camera, recording.target.points_m
+    seen = np.isfinite(recording.corners_px).all(-1)
+    observed_px = recording.corners_px[seen]
+    camera_T_other = se3.inverse(parent_T_camera) @ hand
+
+    def residuals_px(twist: Array) -> Array:
+        camera_T_target = camera_T_other @ se3.exp(twist) @ start
+        points_camera = se3.transform_points(camera_T_target, points_m)[seen]
+        return np.asarray((project(camera, np.eye(4), points_camera) - observed_px).ravel())
+
+    twist = least_squares(residuals_px, np.zeros(6), method="lm", x_scale="jac").x
+    return np.asarray(se3.exp(twist) @ start)
+
+
+def _has_pixels(recording: Recording) -> bool:
+    return {Need.CORNERS, Need.INTRINSICS} <= recording.offers()
+
+
+def _residuals(parent_T_camera: Array, other_T_target: Array, recording: Recording, i: int) -> Array:
+    """[rms px or NaN, mm, deg] of one sample."""
+    assert recording.camera_T_target is not None
+    predicted = se3.inverse(parent_T_camera) @ recording.hand_poses()[i] @ other_T_target
+    observed = recording.camera_T_target[i]
+    pixels = np.nan
+    if _has_pixels(recording):
+        assert recording.corners_px is not None
+        assert recording.camera is not None
+        assert recording.target is not None
+        seen = np.isfinite(recording.corners_px[i]).all(-1)
+        offsets = project(recording.camera, predicted, recording.target.points_m[seen])
+        pixels = np.sqrt(((offsets - recording.corners_px[i][seen]) ** 2).sum(1).mean())
+    millimetres = 1e3 * se3.translation_error_m(predicted, observed)
+    return np.array([pixels, millimetres, np.rad2deg(se3.rotation_error_rad(predicted, observed))])
+
+
+@hookimpl
+def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
+    """This file's ruler."""
+    yield EvaluatorSpec(
+        name="held_out",
+        summary="prediction of left-out samples",
+        columns=_COLUMNS,
+        factory=lambda: held_out,
+        reads_truth=False,
+        applies=lambda recording: Need.TARGET_POSES in recording.offers(),
+    )
