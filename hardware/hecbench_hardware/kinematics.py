@@ -1,8 +1,8 @@
 """Forward and inverse kinematics of the Universal Robots e-series, nominal lengths, closed form.
 
-Lengths: Universal Robots, "DH parameters for calculations of kinematics and dynamics". The inverse follows the
-geometry of Hawkins 2013, "Analytic inverse kinematics for the Universal Robots UR-5/UR-10 arms", rewritten so that
-every angle comes from an atan2: the wrist from rotation entries alone, which stays accurate at its singularity.
+Lengths: Universal Robots, "DH parameters for calculations of kinematics and dynamics". The inverse follows
+the geometry of Hawkins 2013, "Analytic inverse kinematics for the Universal Robots UR-5/UR-10 arms", with
+the wrist taken by atan2 from rotation entries alone, which stays accurate at its singularity.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class UrArm:
         return -sum(self.a_m) + sum(self.d_m[1:])
 
     def link_frames(self, joints_rad: ArrayLike) -> Array:
-        """base_T_link (..., 6, 4, 4) after each joint, for joints (..., 6) rad; the last one is base_T_flange."""
+        """base_T_link (..., 6, 4, 4) after each joint, for joints (..., 6) rad; the last is base_T_flange."""
         joints = np.asarray(joints_rad, float)
         c, s = np.cos(joints), np.sin(joints)
         a = np.array([0.0, *self.a_m, 0.0, 0.0, 0.0])
@@ -72,9 +72,9 @@ class UrArm:
     def inverse(self, base_T_flange: ArrayLike, near_rad: ArrayLike | None = None) -> Array:
         """All joint solutions (K, 6) rad, K <= 8, of a flange pose (4, 4); no row when it is out of reach.
 
-        Angles lie in (-pi, pi]. With `near_rad` (6,) every angle is turned by full turns to the value nearest to it
-        within the joint range, wrist 3 keeps its value where it is free (wrist singularity), and the rows are
-        sorted by their largest joint step from there.
+        Angles lie in (-pi, pi]. With `near_rad` (6,) every angle is turned by full turns to the value nearest
+        to it within the joint range, wrist 3 keeps its value where it is free (wrist singularity), and the
+        rows are sorted by their largest joint step from there.
         """
         target = np.asarray(base_T_flange, float)
         near = None if near_rad is None else np.asarray(near_rad, float)
@@ -107,7 +107,7 @@ class UrArm:
         q5 = atan2(s5, c5)
         q6 = free_wrist_3 if abs(s5) < _WRIST_SINGULAR else atan2(-along_y * wrist, along_x * wrist)
         c6, s6 = cos(q6), sin(q6)
-        # axes of link 5: x5 = c6 x6 - s6 y6, y5 = s6 x6 + c6 y6, z5 = z6; link 4: x4 = c5 x5 - s5 z5, z4 = -y5
+        # link 5: x5 = c6 x6 - s6 y6, y5 = s6 x6 + c6 y6, z5 = z6; link 4: x4 = c5 x5 - s5 z5, z4 = -y5
         x5x, x5y, x5z = c6 * r00 - s6 * r01, c6 * r10 - s6 * r11, c6 * r20 - s6 * r21
         z4x, z4y, z4z = -(s6 * r00 + c6 * r01), -(s6 * r10 + c6 * r11), -(s6 * r20 + c6 * r21)
         sin5, cos5 = sin(q5), cos(q5)

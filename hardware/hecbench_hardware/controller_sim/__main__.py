@@ -1,0 +1,30 @@
+"""The process of `SimulatedController`, with arguments HOST MODEL TIME_SCALE VERSION."""
+
+import sys
+
+from hecbench.errors import HecbenchError
+from hecbench_hardware.controller_sim.server import serve
+
+
+def main(host: str, model: str, time_scale: str, version: str) -> None:
+    """Serve until told to stop; one line on stdout: ready, or what is wrong."""
+    major, minor, bugfix, build = (int(part) for part in version.split("."))
+
+    def announce(line: str) -> None:
+        sys.stdout.write(f"{line}\n")
+        sys.stdout.flush()
+
+    try:
+        serve(
+            host,
+            model=model,
+            time_scale=float(time_scale),
+            version=(major, minor, bugfix, build),
+            announce=announce,
+        )
+    except HecbenchError as error:
+        announce(str(error))
+        sys.exit(error.exit_code)
+
+
+main(*sys.argv[1:])

@@ -1,0 +1,78 @@
+"""Faults on demand: one line of text on the fault port, one line back.
+
+The port is the simulation's own (a real controller has none). Times are seconds of the wall clock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hecbench_hardware.controller_sim.arm import HOME_RAD
+from hecbench_hardware.controller_sim.dashboard import Dashboard
+from hecbench_hardware.controller_sim.robotiq import RobotiqSocket
+
+
+@dataclass
+class Faults:
+    """What is broken at the moment, and the verbs that break and mend it."""
+
+    dashboard: Dashboard
+    gripper: RobotiqSocket
+    link_down_s: float = 0.0
+    """How long the network shall be down; the server takes it and sets it back."""
+    stream_frozen: bool = False
+    _verbs: dict[str, Callable[[list[float]], None]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Name the verbs."""
+        arm, program = self.dashboard.program.arm, self.dashboard.program
+        self._verbs = {
+            "protective_stop": lambda _: arm.protective_stop("injected"),
+            "emergency_stop": lambda _: arm.emergency_stop(),
+            "release_emergency_stop": lambda _: arm.release_emergency_stop(),
+            "link_loss": lambda x: setattr(self, "link_down_s", x[0]),
+            "local_mode": lambda _: self._local_mode(),
+            "slow": lambda x: setattr(arm, "slowdown", x[0]),
+            "stale": lambda _: setattr(self, "stream_frozen", True),
+            "unreachable": lambda _: setattr(arm, "nothing_reachable", True),
+            "contact": lambda x: setattr(arm, "contact_plane_m", x[0]),
+            "push": lambda x: setattr(arm, "external_force_n", x[0]),
+            "hand": lambda x: program.push_by_hand(np.array(x)),
+            "program": lambda _: program.load("def other():\n sleep(3600)\nend\n"),
+            "end_program": lambda _: program.kill(),
+            "gripper_jam": lambda _: setattr(self.gripper, "jammed", True),
+            "gripper_silent": lambda _: setattr(self.gripper, "silent", True),
+            "gripper_object": lambda x: setattr(self.gripper, "object_at", int(x[0])),
+            "reset": lambda _: self._reset(),
+        }
+
+    def answer(self, line: str) -> str:
+        """Do one verb: `ok`, or what is wrong with the line. `log` answers the controller's events."""
+        name, *words = line.split() or [""]
+        if name == "log":
+            return " | ".join(self.dashboard.program.arm.log)
+        if name not in self._verbs:
+            return f"unknown fault '{name}': choose one of {', '.join(self._verbs)}, log"
+        try:
+            self._verbs[name]([float(word) for word in words])
+        except (ValueError, IndexError):
+            return f"wrong numbers in '{line.strip()}'"
+        return "ok"
+
+    def _local_mode(self) -> None:
+        self.dashboard.remote = False
+        self.dashboard.program.kill()
+
+    def _reset(self) -> None:
+        """A controller as it was at the start, at the home pose."""
+        program, arm = self.dashboard.program, self.dashboard.program.arm
+        program.kill()
+        fresh = type(arm)(arm.arm)
+        fresh.time_s, fresh.dt_s = arm.time_s, arm.dt_s
+        vars(arm).update(vars(fresh))
+        arm.joints = np.array(HOME_RAD)
+        vars(self.gripper).update(vars(RobotiqSocket()))
+        self.dashboard.remote, self.stream_frozen = True, False

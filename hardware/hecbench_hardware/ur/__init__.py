@@ -1,0 +1,1 @@
+"""The Universal Robots driver: worker processes, a supervisor, motions with deadlines, recovery."""

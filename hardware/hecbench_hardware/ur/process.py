@@ -1,0 +1,100 @@
+"""A worker process and the pipe to it, with a deadline on everything."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+import threading
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+from hecbench.errors import HecbenchError
+from hecbench_hardware.ur import worker
+
+_START_S = worker.CONNECT_S + 5.0
+_GRACE_S = 0.2
+"""How much longer than the worker's own deadline the parent waits before it ends the worker."""
+
+
+class WorkerGone(Exception):
+    """The worker ended or did not answer in time; it is certainly ended now."""
+
+
+class Worker:
+    """One worker process. Its death is noticed at the next use, and `end` always leaves none behind."""
+
+    def __init__(self, role: str, host: str) -> None:
+        """Start the process; `ready` must follow."""
+        ours, theirs = socket.socketpair()
+        with theirs:
+            command = [sys.executable, "-P", str(Path(worker.__file__)), role, host, str(theirs.fileno())]
+            self._process = subprocess.Popen(
+                command,
+                pass_fds=[theirs.fileno()],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL,
+            )
+        self.connection = Connection(os.dup(ours.fileno()))
+        ours.close()
+        self._lock = threading.Lock()
+
+    @property
+    def pid(self) -> int:
+        """Process id."""
+        return self._process.pid
+
+    def ready(self, *, raw: bool) -> None:
+        """Wait for the first message; raises `HecbenchError` with the client's own words when it failed."""
+        try:
+            if not self.connection.poll(_START_S):
+                raise EOFError
+            failure = self.connection.recv_bytes().decode() if raw else self.connection.recv()[1]
+        except (EOFError, OSError):
+            self.end()
+            raise WorkerGone("the client did not connect") from None
+        if failure:
+            self.end()
+            raise HecbenchError(failure)
+
+    def request(self, name: str, *args: object, deadline_s: float = worker.CALL_S) -> Any:
+        """Ask for one method and wait for its result, at most `deadline_s` and a little.
+
+        Raises:
+            WorkerGone: The worker ended, or did not answer and was ended.
+            HecbenchError: The client refused, in its own words.
+        """
+        with self._lock:
+            try:
+                self.connection.send((name, args, deadline_s))
+                if not self.connection.poll(deadline_s + _GRACE_S):
+                    raise EOFError
+                fine, result = self.connection.recv()
+            except (EOFError, OSError):
+                self.end()
+                raise WorkerGone(f"{name} had no answer") from None
+        if not fine:
+            raise HecbenchError(str(result))
+        return result
+
+    def leave(self) -> None:
+        """Let the worker stop the arm and go; ends it when it does not."""
+        try:
+            self.connection.send(None)
+            self._process.wait(worker.LEAVE_S + _GRACE_S)
+        except (OSError, subprocess.TimeoutExpired):
+            pass
+        self.end()
+
+    def kill(self) -> None:
+        """End the process at once; the pipe stays, at its end."""
+        self._process.kill()
+        self._process.wait()
+
+    def end(self) -> None:
+        """End the process at once, and the pipe."""
+        self.kill()
+        self.connection.close()

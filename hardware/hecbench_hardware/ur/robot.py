@@ -1,0 +1,365 @@
+"""The UR arm behind the `Robot` protocol: read-only until enabled, limits first, polled motions."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import asdict
+from typing import Any, Self
+
+import numpy as np
+
+from hecbench import se3
+from hecbench.errors import HecbenchError, InputError
+from hecbench.se3 import Array
+from hecbench_hardware import limits as bounds
+from hecbench_hardware.devices import DeviceFault, Fault, RobotState
+from hecbench_hardware.kinematics import UrArm
+from hecbench_hardware.limits import Limits
+from hecbench_hardware.ur import recovery
+from hecbench_hardware.ur.dashboard import Dashboard, probe
+from hecbench_hardware.ur.outputs import Outputs
+from hecbench_hardware.ur.process import Worker, WorkerGone
+from hecbench_hardware.ur.stream import Sample, StateStream, Supervision
+from hecbench_hardware.ur.worker import STOP_RAD_S2
+
+POLL_S = 0.001
+STILL_RAD_S = 1e-3
+STILL_FOR_S = 0.3
+_ARRIVED_RAD = 1e-3
+_NEWS_S = 0.2
+"""How long to wait for the supervisor to learn why a program ended."""
+
+
+class UrRobot:
+    """One arm. Connecting only reads; `enable` takes control."""
+
+    def __init__(
+        self,
+        host: str,
+        arm: UrArm,
+        *,
+        limits: Limits | None = None,
+        supervision: Supervision | None = None,
+    ) -> None:
+        """Connect to the state stream.
+
+        Raises:
+            DeviceFault: Nothing answers there.
+            InputError: The controller drives another model.
+        """
+        self.name = f"robot {host}"
+        self.host, self.arm = host, arm
+        self.limits, self.supervision = limits or Limits(), supervision or Supervision()
+        self.flange_T_tcp: Array | None = None
+        """Tool centre point that is set on the controller; known once enabled."""
+        probe(host)
+        self._dashboard = Dashboard(host)
+        self.simulated = self._dashboard.is_simulated()
+        self._refuse_other_model()
+        self._control: Worker | None = None
+        self._slider: float | None = None
+        self._target: Array | None = None
+        self._stopping = threading.Event()
+        self._motion = threading.Lock()
+        self._stream = StateStream(host, self.supervision)
+
+    def _refuse_other_model(self) -> None:
+        answer = self._dashboard.ask("get robot model").upper()
+        if answer.rstrip("E") != self.arm.name.upper().rstrip("E"):
+            raise InputError(f"{self.name} is a {answer}, not a {self.arm.name}: choose the right --robot")
+
+    # reading
+
+    def state(self) -> RobotState:
+        """The newest state; raises `DeviceFault` when the link is lost or silent."""
+        if self._stream.fault and self._stream.link_lost:
+            raise self._stream.fault
+        return self._as_state(self._stream.latest)
+
+    def _as_state(self, sample: Sample) -> RobotState:
+        return RobotState(
+            joints_rad=sample.joints,
+            joint_speeds_rad_s=sample.joint_speeds,
+            base_T_flange=self.arm.forward(sample.joints),
+            base_T_tcp=sample.base_T_tcp,
+            wrench=sample.wrench,
+            robot_stamp_s=sample.controller_s,
+            host_stamp_s=time.time() - (time.monotonic() - sample.arrived_s),
+            speed_fraction=sample.speed_fraction,
+        )
+
+    def describe(self) -> dict[str, Any]:
+        """Model, versions, tool offset, and how far our kinematics are from the controller's own pose.
+
+        The controller uses the lengths of its factory calibration, we the nominal ones: the difference, some
+        millimetres on a real arm, is part of every hand-eye error.
+        """
+        state = self.state()
+        gap: dict[str, float] = {}
+        if self.flange_T_tcp is not None:
+            ours = state.base_T_flange @ self.flange_T_tcp
+            gap = {
+                "kinematics_gap_mm": 1e3 * float(se3.translation_error_m(ours, state.base_T_tcp)),
+                "kinematics_gap_deg": float(np.degrees(se3.rotation_error_rad(ours, state.base_T_tcp))),
+            }
+        return {
+            "model": self.arm.name,
+            "host": self.host,
+            "simulated": self.simulated,
+            "controller": self._dashboard.ask("PolyscopeVersion"),
+            "serial_number": self._dashboard.ask("get serial number"),
+            "flange_T_tcp": None if self.flange_T_tcp is None else self.flange_T_tcp.tolist(),
+            "base_T_tcp": state.base_T_tcp.tolist(),
+            "joints_rad": state.joints_rad.tolist(),
+            **gap,
+            "limits": asdict(self.limits),
+        }
+
+    # taking control
+
+    @property
+    def enabled(self) -> bool:
+        """Whether the arm can be moved from here."""
+        return self._control is not None
+
+    def enable(self, speed_slider: float | None = None) -> Self:
+        """Take control: upload the control script, read the tool offset, start to supervise.
+
+        Args:
+            speed_slider: Set the slider to this fraction; `close` sets it back.
+
+        Raises:
+            DeviceFault: Local mode, another program or client, a safety stop, power off.
+        """
+        sample = self._stream.latest
+        recovery.refuse_unready(self.name, self._dashboard, sample)
+        self._slider = None if speed_slider is None else sample.speed_fraction
+        self._take_control()
+        if speed_slider is not None:
+            self._set_slider(speed_slider)
+        return self
+
+    def _take_control(self) -> None:
+        worker = Worker("control", self.host)
+        try:
+            worker.ready(raw=False)
+        except WorkerGone as error:
+            raise DeviceFault(Fault.LINK_LOST, self.name, str(error)) from None
+        except HecbenchError as error:
+            raise recovery.explained(self.name, str(error)) from None
+        self._control = worker
+        offset = np.array(self._request("call", "getTCPOffset"))
+        self.flange_T_tcp = se3.from_rotvec(offset[3:], offset[:3])
+        self._stream.supervise(self._on_fault)
+
+    def _set_slider(self, fraction: float) -> None:
+        with Outputs(self.host) as outputs:
+            outputs.call("setSpeedSlider", fraction)
+
+    def _on_fault(self, fault: Fault) -> None:
+        """Runs in the supervisor's thread. A controller that stopped by itself needs no telling."""
+        if fault in (Fault.FORCE, Fault.STALE, Fault.LINK_LOST):
+            with suppress(DeviceFault):
+                self._dashboard.ask("stop")
+
+    def _request(self, method: str, *args: object) -> Any:
+        """One request to the control worker; its death becomes the fault that caused it."""
+        control = self._control
+        if control is None:
+            raise self._stream.fault or InputError(f"{self.name} is read-only: add --arm to let it move")
+        try:
+            return control.request(method, *args)
+        except WorkerGone as error:
+            self._control = None
+            self._on_fault(Fault.LINK_LOST)
+            raise self._stream.fault or DeviceFault(Fault.LINK_LOST, self.name, str(error)) from None
+
+    # moving
+
+    def move_joints(self, joints_rad: Array, *, speed_rad_s: float | None = None) -> None:
+        """Straight in joint space; the path is checked first.
+
+        Raises:
+            InputError: The target or the path leaves the limits, or the arm is read-only.
+            DeviceFault: It did not arrive, and why.
+        """
+        target = bounds.six_joints(joints_rad)
+        speed = _speed(speed_rad_s, self.limits.joint_speed_rad_s, "rad/s")
+        start = self._ready_joints()
+        bounds.check_path(self.arm, bounds.joint_path(start, target), self.limits)
+        acceleration = self.limits.joint_acceleration_rad_s2
+        expected_s = bounds.motion_time_s(float(np.abs(target - start).max()), speed, acceleration)
+        self._move("moveJ", target.tolist(), speed, acceleration, expected_s)
+        self._target = target
+
+    def move_linear(self, base_T_flange: Array, *, speed_m_s: float | None = None) -> None:
+        """Straight in space; the path is checked first. Raises as `move_joints` does."""
+        speed = _speed(speed_m_s, self.limits.tool_speed_m_s, "m/s")
+        start = self._ready_joints()
+        path = bounds.linear_path(self.arm, start, np.asarray(base_T_flange, float))
+        bounds.check_path(self.arm, path, self.limits)
+        assert self.flange_T_tcp is not None
+        base_T_tcp = base_T_flange @ self.flange_T_tcp
+        vector = [*base_T_tcp[:3, 3].tolist(), *se3.so3_log(base_T_tcp[:3, :3]).tolist()]
+        acceleration = self.limits.tool_acceleration_m_s2
+        length = float(np.linalg.norm(base_T_tcp[:3, 3] - self._stream.latest.tcp_vector[:3]))
+        turn = float(np.abs(np.diff(path, axis=0)).sum(axis=0).max())
+        expected_s = bounds.motion_time_s(length, speed, acceleration) + bounds.motion_time_s(
+            turn, self.limits.joint_speed_rad_s, self.limits.joint_acceleration_rad_s2
+        )
+        self._move("moveL", vector, speed, acceleration, expected_s)
+        self._target = None
+
+    def _ready_joints(self) -> Array:
+        if self._stream.fault:
+            raise self._stream.fault
+        if self._control is None:
+            raise InputError(f"{self.name} is read-only: add --arm to let it move")
+        return self._stream.latest.joints
+
+    def _move(
+        self, name: str, target: list[float], speed: float, acceleration: float, expected_s: float
+    ) -> None:
+        if not self._motion.acquire(blocking=False):
+            raise InputError(f"{self.name} is moving already: stop it or wait")
+        self._stopping.clear()
+        first = self._stream.latest
+        allowed_s = expected_s / max(first.speed_fraction, 0.01) + self.supervision.late_s
+        try:
+            before = self._request("start", name, target, speed, acceleration)
+            if before is None:
+                raise self._why_program_ended()
+            while not self._has_ended(before):
+                waited_s = max(
+                    self._stream.latest.controller_s - first.controller_s, time.monotonic() - first.arrived_s
+                )
+                if waited_s > allowed_s:
+                    raise DeviceFault(
+                        Fault.LATE, self.name, f"{waited_s:.1f} s for a motion of {expected_s:.1f} s"
+                    )
+                if self._stopping.wait(POLL_S):
+                    raise DeviceFault(Fault.STOPPED, self.name, "stopped on request")
+        except BaseException:
+            self.stop()
+            raise
+        finally:
+            self._motion.release()
+
+    def _has_ended(self, before: int) -> bool:
+        operation, running, playing = self._request("progress")
+        if self._stream.fault:
+            raise self._stream.fault
+        if not playing:
+            raise self._why_program_ended()
+        return operation != before and not running
+
+    def _why_program_ended(self) -> DeviceFault:
+        self._stream.wait_for(lambda _: self._stream.fault is not None, _NEWS_S)
+        if self._stream.fault:
+            return self._stream.fault
+        if not self._dashboard.is_remote():
+            return DeviceFault(Fault.LOCAL_MODE, self.name, "the pendant took over")
+        return DeviceFault(Fault.PROGRAM_ENDED, self.name, "the controller ended the control program")
+
+    def settle(self, timeout_s: float = 5.0) -> RobotState:
+        """Wait until no joint has moved for a while, and check that the last joint target was reached.
+
+        Raises:
+            DeviceFault: The arm does not come to rest, is elsewhere, or the link is lost.
+        """
+        moved_s = self._stream.latest.controller_s
+
+        def still(sample: Sample) -> bool:
+            nonlocal moved_s
+            if np.abs(sample.joint_speeds).max() >= STILL_RAD_S:
+                moved_s = sample.controller_s
+            return sample.controller_s - moved_s >= STILL_FOR_S
+
+        if not self._stream.wait_for(still, timeout_s):
+            raise self._stream.fault or DeviceFault(
+                Fault.LATE, self.name, f"not still after {timeout_s:.1f} s"
+            )
+        state = self.state()
+        if self._target is not None:
+            gap_rad = float(np.abs(state.joints_rad - self._target).max())
+            if gap_rad > _ARRIVED_RAD:
+                raise DeviceFault(Fault.OFF_TARGET, self.name, f"a joint is {gap_rad:.4f} rad off")
+        return state
+
+    def stop(self) -> None:
+        """Brake now, from any thread; by the dashboard when the client does not answer."""
+        self._stopping.set()
+        self._target = None
+        if self._control is None:
+            return
+        if self._stream.link_lost:
+            control, self._control = self._control, None
+            if control:
+                control.end()
+            self._on_fault(Fault.LINK_LOST)
+            return
+        with suppress(DeviceFault):
+            self._request("call", "stopJ", STOP_RAD_S2)
+
+    @contextmanager
+    def freedrive(self) -> Iterator[None]:
+        """The arm can be guided by hand inside the block."""
+        self._ready_joints()
+        self._target = None
+        if not self._request("call", "freedriveMode"):
+            raise self._why_program_ended()
+        try:
+            yield
+        finally:
+            with suppress(HecbenchError):
+                self._request("call", "endFreedriveMode")
+
+    # after a fault, and the end
+
+    def recover(self, acknowledge: Callable[[str], bool]) -> bool:
+        """Make ready again after a fault, with the operator's word; False when the operator says no.
+
+        Raises:
+            DeviceFault: It cannot be made ready.
+        """
+        fault = self._stream.fault
+        if not acknowledge(str(fault) if fault else f"{self.name}: take control again"):
+            return False
+        if self._control:
+            self._control.end()
+            self._control = None
+        self._stream.close()
+        recovery.make_ready(self.name, self._dashboard)
+        self._stream = StateStream(self.host, self.supervision)
+        recovery.refuse_unready(self.name, self._dashboard, self._stream.latest)
+        self._take_control()
+        return True
+
+    def close(self) -> None:
+        """Stop the arm, end the control script, let go of the controller. May be called twice."""
+        control, self._control = self._control, None
+        if control:
+            control.leave()
+            if self._slider is not None:
+                with suppress(HecbenchError):
+                    self._set_slider(self._slider)
+        self._stream.close()
+
+    def __enter__(self) -> Self:
+        """The robot itself."""
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        """Close."""
+        self.close()
+
+
+def _speed(asked: float | None, limit: float, unit: str) -> float:
+    if asked is None:
+        return limit
+    if not 0 < asked <= limit:
+        raise InputError(f"a speed of {asked} {unit} is not above 0 and at most the limit {limit} {unit}")
+    return asked
