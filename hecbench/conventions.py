@@ -187,6 +187,7 @@ def prove(
     robot: Sequence[Reading],
     target: Sequence[Reading],
     mountings: Sequence[Mounting],
+    told: bool = False,
 ) -> Proof:
     """The one combination of readings that holds the target still; documented readings go first.
 
@@ -195,6 +196,7 @@ def prove(
         robot: readings as base_T_flange (N, 4, 4).
         target: readings as camera_T_target (N, 4, 4).
         mountings: the documented or possible ones; the others count as deviations.
+        told: the user vouches for the mounting; no other is tried.
 
     Raises:
         InputError: several readings hold it equally still (all are listed), or none is documented and none
@@ -205,7 +207,7 @@ def prove(
         raise InputError(
             f"{source}: {count} robot poses for {len(target[0].poses)} target poses; pair them up"
         )
-    candidates = list(_candidates(robot, target, mountings))
+    candidates = list(_candidates(robot, target, mountings, told))
     documented = [c for c in candidates if c.deviations == 0]
     if count < _LEAST_SAMPLES and len(documented) == 1:
         return _proof(documented[0], f"{source}: read as {documented[0].name}; too few samples to prove it")
@@ -243,7 +245,7 @@ def _proof(chosen: _Candidate, note: str) -> Proof:
 
 
 def _candidates(
-    robot: Sequence[Reading], target: Sequence[Reading], mountings: Sequence[Mounting]
+    robot: Sequence[Reading], target: Sequence[Reading], mountings: Sequence[Mounting], told: bool
 ) -> Iterator[_Candidate]:
     """Combinations worth fitting: rotations must turn by the same angles whatever the directions are."""
     robot_angles = [_turns(reading.poses) for reading in robot]
@@ -255,7 +257,7 @@ def _candidates(
         deviations = robot[i].deviations + target[j].deviations
         if gap > limit and deviations:
             continue
-        for mounting in Mounting:
+        for mounting in mountings if told else Mounting:
             flange_poses = robot[i].poses
             hand = flange_poses if mounting is Mounting.EYE_TO_HAND else se3.inverse(flange_poses)
             still = stillness(hand, target[j].poses)

@@ -1,0 +1,172 @@
+"""Other people's files as plain values; every fault is an `InputError` that names the file."""
+
+from __future__ import annotations
+
+import csv
+import io
+import re
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hecbench import files
+from hecbench.errors import InputError
+
+Array = NDArray[np.float64]
+
+YAML_SUFFIXES = (".yaml", ".yml")
+IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
+
+
+def head(path: Path, count: int = 4096) -> str:
+    """The first characters of a file for sniffing; empty when it is none or unreadable."""
+    try:
+        with path.open("rb") as stream:
+            return stream.read(count).decode("utf-8", "replace")
+    except OSError:
+        return ""
+
+
+def files_in(folder: Path, *suffixes: str) -> list[Path]:
+    """The folder's files with these suffixes in natural order (2 before 10); none when it is no folder."""
+    try:
+        found = [path for path in folder.iterdir() if path.suffix.lower() in suffixes and path.is_file()]
+    except OSError:
+        return []
+    return sorted(found, key=natural)
+
+
+def natural(path: Path | str) -> list[tuple[int, str]]:
+    """Sorting key that reads the numbers in a name as numbers."""
+    parts = re.findall(r"\d+|\D+", Path(path).name)
+    return [(int(part), "") if part.isdecimal() else (-1, part) for part in parts]
+
+
+def text(path: Path) -> str:
+    """The file as text."""
+    try:
+        return files.read_bytes(path).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: is not UTF-8 text ({error.reason}); save it as UTF-8") from error
+
+
+def json_value(path: Path) -> Any:
+    """A JSON file."""
+    try:
+        return msgspec.json.decode(text(path))
+    except (msgspec.MsgspecError, RecursionError) as error:
+        raise InputError(f"{path}: is not readable JSON ({error})") from error
+
+
+def yaml_value(path: Path) -> Any:
+    """A YAML file, OpenCV's FileStorage included: its matrices become arrays."""
+    return yaml_text(text(path), str(path))
+
+
+def yaml_text(content: str, source: str) -> Any:
+    """YAML text, OpenCV's FileStorage included; `source` names it in errors."""
+    import yaml
+
+    class Loader(getattr(yaml, "CSafeLoader", yaml.SafeLoader)):  # type: ignore[misc]
+        """Safe, and knows OpenCV's matrices."""
+
+    Loader.add_constructor("tag:yaml.org,2002:opencv-matrix", _opencv_matrix)
+    content = re.sub(r"\A%YAML:1\.\d\s*(\n---)?", "", content)
+    try:
+        return yaml.load(content, Loader)
+    except (yaml.YAMLError, ValueError, TypeError, KeyError, RecursionError) as error:
+        reason = " ".join(str(error).split())
+        raise InputError(f"{source}: is not readable YAML ({reason})") from error
+
+
+def _opencv_matrix(loader: Any, node: Any) -> Array:
+    fields = loader.construct_mapping(node, deep=True)
+    return np.array(fields["data"], float).reshape(int(fields["rows"]), int(fields["cols"]))
+
+
+def table(content: str, source: str) -> Array:
+    """Rows of numbers (N, columns), separated by commas, semicolons, tabs or blanks; comments and one header
+    line are skipped."""
+    rows: list[list[float]] = []
+    for number, line in enumerate(io.StringIO(content), 1):
+        line = line.split("#")[0].strip()
+        if not line:
+            continue
+        cells = next(csv.reader([re.sub(r"[\s;,]+", ",", line).strip(",")]))
+        try:
+            values = [float(cell) for cell in cells]
+        except ValueError:
+            if rows:
+                raise InputError(f"{source}: line {number}: '{line[:40]}' is not a row of numbers") from None
+            continue
+        if rows and len(values) != len(rows[0]):
+            raise InputError(
+                f"{source}: line {number}: {len(values)} numbers after rows of {len(rows[0])}; complete it"
+            )
+        rows.append(values)
+    if not rows:
+        raise InputError(f"{source}: holds no row of numbers")
+    return finite(rows, source)
+
+
+def finite(values: ArrayLike, source: str, shape: tuple[int, ...] | None = None) -> Array:
+    """An array of finite numbers, of a shape when one is given (-1: any)."""
+    try:
+        array = np.asarray(values, float)
+        array = array if shape is None else array.reshape(shape)
+    except (ValueError, TypeError):
+        raise InputError(f"{source}: expected numbers{f' of shape {shape}' if shape else ''}") from None
+    if not np.isfinite(array).all():
+        raise InputError(f"{source}: holds a number that is not finite")
+    return array
+
+
+def item(mapping: Any, key: str, source: Path | str) -> Any:
+    """A value of a mapping that must be there."""
+    if not isinstance(mapping, dict) or key not in mapping:
+        raise InputError(f"{source}: has no '{key}'")
+    return mapping[key]
+
+
+def image_size(path: Path) -> tuple[int, int]:
+    """Width and height in px from an image's header, without decoding it."""
+    from PIL import Image
+
+    try:
+        with Image.open(path) as picture:
+            return picture.size
+    except (OSError, SyntaxError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read as an image ({error}); restore the file") from error
+
+
+def picture(content: bytes, mode: str, source: str) -> NDArray[np.uint8]:
+    """Decode image bytes, (height, width, 3) for "RGB" or (height, width) for "L"."""
+    from PIL import Image
+
+    try:
+        with Image.open(io.BytesIO(content)) as opened:
+            return np.asarray(opened.convert(mode))
+    except (OSError, SyntaxError, ValueError) as error:
+        raise InputError(f"{source}: cannot be read as an image ({error}); restore the file") from error
+
+
+def zip_names(path: Path) -> list[str]:
+    """Names of the files in an archive; none when it is not a readable one."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return [name for name in archive.namelist() if not name.endswith("/")]
+    except (OSError, zipfile.BadZipFile, ValueError):
+        return []
+
+
+def zip_bytes(path: Path, name: str) -> bytes:
+    """One file of an archive."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            return archive.read(name)
+    except (OSError, zipfile.BadZipFile, KeyError, ValueError, RuntimeError) as error:
+        raise InputError(f"{path}: '{name}' cannot be read ({error}); fetch the archive again") from error

@@ -1,0 +1,142 @@
+"""Two time-stamped trajectories: CSV of ethz hand_eye_calibration and Kalibr (t, x y z, qx qy qz qw), or TUM.
+
+The files' names say which is the robot's. As both describe them, the robot's is base_T_hand and the camera's
+target_T_camera, camera on the hand. The clocks may differ: the offset is where the turning speeds of the two
+correlate best, and the robot's poses are interpolated at the camera's stamps.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import replace
+from pathlib import Path, PurePosixPath
+
+import numpy as np
+
+from hecbench.errors import InputError
+from hecbench.recording import Mounting, Recording
+from hecbench.registry import hookimpl
+from hecbench.specs import DatasetSpec
+from hecbench_datasets.reading.hints import hints_for
+from hecbench_datasets.reading.pairing import Documented, paired
+from hecbench_datasets.reading.sources import Array, files_in, head, table, text, zip_bytes, zip_names
+from hecbench_datasets.reading.streams import interpolate, time_offset_s
+
+MOST_SAMPLES = 160
+"""A stream is thinned evenly to about so many pairs: neighbours at camera rate repeat each other."""
+
+_ROBOT = re.compile(r"hand|robot|flange|gripper|effector|tool|base_ee", re.IGNORECASE)
+_CAMERA = re.compile(r"cam|eye|target|marker|tag|board|tracking", re.IGNORECASE)
+_SUFFIXES = (".csv", ".txt", ".tum")
+_NANOSECONDS_ABOVE = 1e14
+
+
+def _streams(path: Path) -> tuple[tuple[Path, str], tuple[Path, str]] | None:
+    """(file, "") or (archive, name inside) of the robot's and of the camera's stream."""
+    if path.is_dir():
+        places = [(file, "") for file in files_in(path, *_SUFFIXES)]
+        if not places:
+            archives = files_in(path, ".zip")
+            places = [(file, name) for file in archives[:1] for name in zip_names(file)]
+    else:
+        places = [(path, name) for name in zip_names(path)] if path.suffix == ".zip" else []
+    places = [place for place in places if _name(place).suffix in _SUFFIXES]
+    camera = [place for place in places if _CAMERA.search(_own(place, places))]
+    robot = [place for place in places if _ROBOT.search(_own(place, places)) and place not in camera]
+    return (robot[0], camera[0]) if len(robot) == len(camera) == 1 else None
+
+
+def _name(place: tuple[Path, str]) -> PurePosixPath:
+    return PurePosixPath(place[1] or place[0].name)
+
+
+def _own(place: tuple[Path, str], places: list[tuple[Path, str]]) -> str:
+    """The part of the file's name that the others do not share."""
+    names = [_name(other).stem for other in places]
+    shared = 0
+    while len(names) > 1 and len({name[: shared + 1] for name in names}) == 1 and shared < len(names[0]):
+        shared += 1
+    return _name(place).stem[shared:]
+
+
+def sniff(path: Path) -> bool:
+    """A folder or archive with one robot and one camera stream of eight numbers a row."""
+    found = _streams(path)
+    if found is None:
+        return False
+    for file, name in found:
+        try:
+            content = zip_bytes(file, name)[:4096].decode("utf-8", "replace") if name else head(file)
+        except InputError:
+            return False
+        rows = [line for line in content.splitlines()[:-1] if line.strip() and not line.startswith("#")]
+        if not rows or len(re.split(r"[\s,;]+", rows[-1].strip())) != 8:
+            return False
+    return True
+
+
+def load(path: Path) -> Recording:
+    """Read both streams, align the clocks, pair by interpolation."""
+    found = _streams(path)
+    if found is None:
+        raise InputError(
+            f"{path}: expected two files, one named like 'robot' or 'hand', one like 'camera' or 'target'"
+        )
+    (robot_stamps, robot), (camera_stamps, camera) = (_read(*place) for place in found)
+    hints, _ = hints_for(path)
+    rows = np.arange(len(camera))
+    note = "the stamps are equal: paired row by row"
+    if len(robot_stamps) != len(camera_stamps) or not np.array_equal(robot_stamps, camera_stamps):
+        offset, quality = hints.time_offset_s, None
+        if offset is None:
+            offset, quality = time_offset_s(robot_stamps, robot, camera_stamps, camera)
+        inside = (camera_stamps + offset >= robot_stamps[0]) & (camera_stamps + offset <= robot_stamps[-1])
+        if not inside.any():
+            raise InputError(f"{path}: the two streams do not overlap in time; check their clocks and units")
+        rows, camera_stamps, camera = rows[inside], camera_stamps[inside], camera[inside]
+        robot, robot_stamps = interpolate(robot_stamps, robot, camera_stamps + offset), camera_stamps + offset
+        how = "as told" if quality is None else f"turning speeds correlate to {quality:.2f}"
+        note = f"robot poses interpolated at camera stamps + {offset:.4f} s ({how})"
+    step = -(-(rows[-1] + 1) // MOST_SAMPLES)
+    kept = rows % step == 0
+    documented = Documented(
+        mounting=Mounting.EYE_IN_HAND,
+        robot_rotation="quat_xyzw",
+        target_inverted=True,
+        target_rotation="quat_xyzw",
+    )
+    recording = paired(
+        path,
+        robot[kept],
+        camera[kept],
+        documented,
+        hints,
+        robot_stamp_s=robot_stamps[kept],
+        camera_stamp_s=camera_stamps[kept],
+    )
+    note = f"{path}: {note}; {kept.sum()} of {len(kept)} pairs kept, every {step}. row"
+    return replace(recording, notes=(*recording.notes, note))
+
+
+def _read(file: Path, name: str) -> tuple[Array, Array]:
+    """Stamps (N,) s in order, and poses (N, 7)."""
+    source = f"{file}: {name}" if name else str(file)
+    rows = table(zip_bytes(file, name).decode("utf-8", "replace") if name else text(file), source)
+    if rows.shape[1] != 8:
+        raise InputError(f"{source}: {rows.shape[1]} numbers a row; expected t, x y z, qx qy qz qw")
+    if np.abs(rows[:, 0]).max() > _NANOSECONDS_ABOVE:
+        rows[:, 0] *= 1e-9
+    rows = rows[np.argsort(rows[:, 0], kind="stable")]
+    return rows[:, 0], rows[:, 1:]
+
+
+@hookimpl
+def hecbench_datasets() -> Iterable[DatasetSpec]:
+    """This file's format."""
+    yield DatasetSpec(
+        name="trajectories",
+        summary="two time-stamped trajectories, robot and camera: ethz/Kalibr CSV or TUM (folder or zip)",
+        sniff=sniff,
+        load=load,
+    )
