@@ -1,0 +1,427 @@
+"""The command line: verbs only. Each reads its arguments, calls one function of the framework, prints the
+answer.
+
+stdout carries the answer (with --json nothing but JSON), stderr progress and messages. What takes long to
+import is imported by the verb that uses it.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from importlib import metadata
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from hecbench import __version__
+from hecbench.errors import HecbenchError, InputError
+
+if TYPE_CHECKING:
+    from hecbench.estimate import Estimate
+    from hecbench.recording import Recording
+    from hecbench.report.tables import Table
+    from hecbench.runner import Options, Task
+    from hecbench.specs import SolverSpec
+
+COMMAND_GROUP = "hecbench.commands"
+"""Entry points of further verbs, loaded when they are named."""
+
+
+class _Verbs(click.Group):
+    """The verbs of this file and those of installed packages."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return sorted({*super().list_commands(ctx), *metadata.entry_points(group=COMMAND_GROUP).names})
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        if (command := super().get_command(ctx, cmd_name)) is not None:
+            return command
+        found = list(metadata.entry_points(group=COMMAND_GROUP, name=cmd_name))
+        return found[0].load() if found else None
+
+
+def main() -> None:
+    """Run the command line; errors become one line and an exit code, never a traceback."""
+    try:
+        code = cli.main(standalone_mode=False)
+    except click.ClickException as error:
+        error.show()
+        code = error.exit_code
+    except HecbenchError as error:
+        click.echo(f"hecbench: {error}", err=True)
+        code = error.exit_code
+    except (click.Abort, KeyboardInterrupt):
+        click.echo("hecbench: interrupted; results written so far are kept", err=True)
+        code = 130
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = 1
+    sys.exit(code)
+
+
+@click.group(cls=_Verbs, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
+@click.version_option(__version__, prog_name="hecbench")
+def cli() -> None:
+    """Calibrate hand-eye rigs with every method, measure all by the same rulers, and report."""
+
+
+_json = click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else.")
+_seed = click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+_solver = click.option(
+    "--solver", "solvers", multiple=True, metavar="NAME", help="Repeatable; default: all that can."
+)
+_folder = click.Path(path_type=Path, file_okay=False)
+_file = click.Path(path_type=Path, dir_okay=False)
+_any_path = click.Path(path_type=Path)
+
+
+@cli.command()
+@click.option("--out", type=_folder, default=Path("out/demo"), show_default=True)
+@click.option(
+    "--samples", type=click.IntRange(min=1), default=40, show_default=True, help="Recordings per setting."
+)
+@_seed
+def demo(out: Path, samples: int, seed: int) -> None:
+    """Calibrate generated recordings with every ready solver; print the tables and write the report."""
+    from hecbench import store
+    from hecbench.report import html
+
+    (out / store.FILE_NAME).unlink(missing_ok=True)
+    levels = ("tag_2m", "small_tag_2m", "board_2m")
+    contents = _run(_suite_tasks("markers", levels, samples, (), seed), out, seed, jobs=os.cpu_count() or 1)
+    _print_tables(contents.estimates)
+    path, _ = html.write(out)
+    click.echo(f"report: {path}")
+
+
+@cli.command()
+@click.option("--kind", help="Only this kind: solver, dataset, suite, ...")
+@_json
+def plugins(kind: str | None, as_json: bool) -> None:
+    """List every plugin, also those that are missing something, broken or in conflict."""
+    from hecbench import registry
+    from hecbench.report.tables import Table
+    from hecbench.specs import Kind
+
+    if kind is not None and kind not in list(Kind):
+        raise InputError(f"--kind {kind}: choose one of {', '.join(Kind)}")
+    rows = [plugin.row() for plugin in registry.load().select(Kind(kind) if kind else None)]
+    if as_json:
+        _print_json(rows)
+        return
+    header = ("name", "kind", "status", "needs", "detail", "distribution")
+    cells = [
+        (r["name"], r["kind"] or "?", r["status"], ", ".join(r["needs"]), r["detail"], r["distribution"])
+        for r in rows
+    ]
+    _print_table(Table("plugins", header, tuple(cells), left=len(header)))
+
+
+@cli.command()
+@click.argument("recording", type=_any_path)
+@_solver
+@click.option("--views", type=click.IntRange(min=1), help="Use this many samples, drawn with --seed.")
+@click.option("--init", type=_file, help="An estimate to start from instead of initial_parent_T_camera.")
+@click.option(
+    "--held-out/--no-held-out",
+    default=None,
+    help="Predict left-out samples; default: where truth is not given.",
+)
+@click.option("--out", type=_folder, help="Write each estimate to DIR/<solver>.json.")
+@_seed
+@_json
+def solve(
+    recording: Path,
+    solvers: tuple[str, ...],
+    views: int | None,
+    init: Path | None,
+    held_out: bool | None,
+    out: Path | None,
+    seed: int,
+    as_json: bool,
+) -> None:
+    """Calibrate one RECORDING; the best estimate comes first."""
+    from hecbench import runner
+    from hecbench.estimate import Status
+    from hecbench.report.tables import Group, table
+
+    loaded = _prepared(runner.load_recording(recording), views, init, seed)
+    specs = _specs(solvers, loaded)
+    if not specs:
+        raise HecbenchError(
+            f"{recording}: no ready solver can use what it offers: {', '.join(sorted(loaded.offers()))}"
+        )
+    estimates = runner.best_first(runner.solve(loaded, specs, _options(seed, held_out)))
+    for estimate in estimates if out else ():
+        estimate.save(Path(str(out)) / f"{estimate.solver}.json")
+    if as_json:
+        _print_json([estimate.to_json() for estimate in estimates])
+    else:
+        _print_table(table(Group(loaded.name, tuple(estimates), is_level=False)))
+        _print_best(estimates[0])
+    answered = [estimate.status is Status.OK for estimate in estimates]
+    if not any(answered) or (solvers and not all(answered)):
+        sys.exit(1)
+
+
+@cli.command()
+@click.argument("sources", nargs=-1, required=True, metavar="SUITE|RECORDING...")
+@_solver
+@click.option(
+    "--level", "levels", multiple=True, metavar="L", help="Level of the suite; repeatable; default: all."
+)
+@click.option("--samples", type=click.IntRange(min=1), help="Recordings per level; default: the suite's.")
+@click.option("--held-out/--no-held-out", default=None, help="As for solve.")
+@click.option("--out", type=_folder, help="Default: out/<first source's name>.")
+@click.option("--jobs", type=int, default=1, show_default=True, help="Worker processes; -1: one per core.")
+@click.option("--resume", is_flag=True, help="Go on with what --out holds.")
+@_seed
+@_json
+def run(
+    sources: tuple[str, ...],
+    solvers: tuple[str, ...],
+    levels: tuple[str, ...],
+    samples: int | None,
+    held_out: bool | None,
+    out: Path | None,
+    jobs: int,
+    resume: bool,
+    seed: int,
+    as_json: bool,
+) -> None:
+    """Run solvers on a SUITE or on RECORDINGs into an append-only store; print the tables."""
+    if jobs == 0:
+        raise InputError("--jobs 0: give a number of processes, or -1 for one per core")
+    tasks = _tasks(sources, solvers, levels, samples, seed)
+    out = out or Path("out") / Path(sources[0]).name
+    contents = _run(tasks, out, seed, jobs=jobs, resume=resume, held_out=held_out)
+    for sentence in contents.damage:
+        click.echo(sentence, err=True)
+    if as_json:
+        _print_json([estimate.to_json() for estimate in contents.estimates])
+    else:
+        _print_tables(contents.estimates)
+    click.echo(f"results: {out}; see them with: hecbench report {out}", err=True)
+    if not any(estimate.parent_T_camera is not None for estimate in contents.estimates):
+        sys.exit(1)
+
+
+@cli.command()
+@click.argument("folder", type=_folder, metavar="DIR")
+@_json
+def report(folder: Path, as_json: bool) -> None:
+    """Write DIR/report.html from the results that a run left in DIR."""
+    from hecbench.report import html
+
+    path, contents = html.write(folder)
+    for sentence in contents.damage:
+        click.echo(sentence, err=True)
+    summary = {"report": str(path), "results": len(contents.estimates), "damage": contents.damage}
+    if as_json:
+        _print_json(summary)
+    else:
+        click.echo(f"{path}: {len(contents.estimates)} results")
+
+
+@cli.command()
+@click.argument("name")
+@_json
+def conformance(name: str, as_json: bool) -> None:
+    """Run the plugin author's checks on the solver NAME."""
+    from dataclasses import asdict
+
+    from hecbench import registry
+    from hecbench.conformance import check_solver
+    from hecbench.report.tables import Table
+    from hecbench.specs import Kind, SolverSpec
+
+    checks = check_solver(registry.load().get(Kind.SOLVER, name, SolverSpec))
+    if as_json:
+        _print_json([asdict(check) for check in checks])
+    else:
+        rows = tuple((check.name, "passed" if check.passed else "FAILED", check.detail) for check in checks)
+        _print_table(Table(name, ("check", "outcome", "detail"), rows, left=3))
+    if not all(check.passed for check in checks):
+        sys.exit(1)
+
+
+@cli.command()
+@_json
+def doctor(as_json: bool) -> None:
+    """Say what is installed, what is missing and how to get it."""
+    from hecbench import doctor as examination
+    from hecbench.report.tables import Table
+
+    findings = examination.examine()
+    if as_json:
+        _print_json([finding.row() for finding in findings])
+        return
+    rows = tuple((f.subject, f.state, f.version, f.cure) for f in findings)
+    _print_table(Table("installation", ("what", "state", "version", "how to get it"), rows, left=4))
+
+
+def _prepared(recording: Recording, views: int | None, init: Path | None, seed: int) -> Recording:
+    """The recording with fewer samples and another start, as asked for."""
+    from dataclasses import replace
+
+    import numpy as np
+
+    from hecbench import estimate
+
+    if views is not None:
+        if views > len(recording):
+            raise InputError(f"--views {views}: {recording.name} has {len(recording)} samples")
+        chosen = np.random.default_rng(seed).choice(len(recording), views, replace=False)
+        recording = recording.subset(np.sort(chosen))
+    if init is not None:
+        start = estimate.load(init)
+        here, there = (recording.mounting, recording.parent_link), (start.mounting, start.parent_link)
+        if start.parent_T_camera is None or here != there:
+            raise InputError(
+                f"{init}: is {start.status}, {' of '.join(there)}; the recording needs {' of '.join(here)}"
+            )
+        recording = replace(recording, initial_parent_T_camera=start.parent_T_camera)
+    return recording
+
+
+def _specs(names: Sequence[str], recording: Recording) -> list[SolverSpec]:
+    """The named solvers, or all ready ones whose needs the recording meets."""
+    from hecbench import registry
+    from hecbench.specs import Kind, SolverSpec
+
+    known = registry.load()
+    if names:
+        return [known.get(Kind.SOLVER, name, SolverSpec) for name in dict.fromkeys(names)]
+    return [spec for spec in known.ready(Kind.SOLVER, SolverSpec) if spec.needs <= recording.offers()]
+
+
+def _tasks(
+    sources: Sequence[str], solvers: Sequence[str], levels: Sequence[str], samples: int | None, seed: int
+) -> list[Task]:
+    from hecbench import registry, runner
+    from hecbench.specs import Kind, SuiteSpec
+
+    suites = [spec.name for spec in registry.load().ready(Kind.SUITE, SuiteSpec)]
+    if sources[0] in suites and len(sources) == 1:
+        return _suite_tasks(sources[0], levels, samples, solvers, seed)
+    if levels or samples is not None:
+        raise InputError(
+            f"--level and --samples are for a suite ({', '.join(sorted(suites))}), not for recordings"
+        )
+    tasks = []
+    for source in sources:
+        if not Path(source).exists():
+            raise InputError(
+                f"{source}: is neither a suite ({', '.join(sorted(suites))}) nor a path that exists"
+            )
+        specs = _specs(solvers, runner.load_recording(Path(source)))
+        tasks.append(runner.Task(tuple(spec.name for spec in specs), path=Path(source)))
+    return tasks
+
+
+def _suite_tasks(
+    name: str, levels: Sequence[str], samples: int | None, solvers: Sequence[str], seed: int
+) -> list[Task]:
+    from hecbench import registry, runner
+    from hecbench.specs import Kind, SuiteSpec
+
+    suite = registry.load().get(Kind.SUITE, name, SuiteSpec)
+    for level in levels:
+        if level not in suite.levels:
+            raise InputError(f"--level {level}: the suite '{name}' has {', '.join(suite.levels)}")
+    tasks = []
+    for level in levels or suite.levels:
+        specs = _specs(solvers, suite.make(level, 0, seed))
+        names = tuple(spec.name for spec in specs)
+        for index in range(samples or suite.default_samples):
+            tasks.append(runner.Task(names, suite=name, level=level, index=index))
+    return tasks
+
+
+def _options(seed: int, held_out: bool | None) -> Options:
+    from hecbench.runner import Options
+
+    words = ["hecbench", *(word for word in sys.argv[1:] if word != "--resume")]
+    return Options(seed=seed, held_out=held_out, command=shlex.join(words))
+
+
+def _run(
+    tasks: list[Task],
+    out: Path,
+    seed: int,
+    *,
+    jobs: int,
+    resume: bool = False,
+    held_out: bool | None = None,
+) -> Any:
+    """Run tasks into a store under a progress bar on stderr."""
+    from dataclasses import replace
+
+    from hecbench import runner
+
+    options = replace(_options(seed, held_out), stop_on_bad_input=False)
+    with _progress(sum(len(task.solvers) for task in tasks)) as advance:
+        return runner.run(
+            tasks, options, out=out, jobs=jobs, resume=resume, on_result=lambda found: advance(len(found))
+        )
+
+
+@contextmanager
+def _progress(total: int) -> Iterator[Callable[[int], None]]:
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = TextColumn("calibrations"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
+    with Progress(*columns, console=Console(stderr=True), transient=True) as progress:
+        bar = progress.add_task("", total=total)
+        yield lambda count: progress.advance(bar, count)
+
+
+def _print_json(value: Any) -> None:
+    import msgspec
+
+    click.echo(msgspec.json.format(msgspec.json.encode(value), indent=1))
+
+
+def _print_tables(estimates: Sequence[Estimate]) -> None:
+    from hecbench.report.tables import groups, table
+
+    for group in groups(estimates):
+        _print_table(table(group))
+
+
+def _print_table(table: Table) -> None:
+    from rich.console import Console
+    from rich.table import Table as RichTable
+
+    console = Console(width=None if sys.stdout.isatty() else 200)
+    shown = RichTable(title=table.title, title_justify="left", header_style="bold")
+    for number, name in enumerate(table.header):
+        shown.add_column(name, justify="left" if number < table.left else "right", overflow="fold")
+    for row in table.rows:
+        shown.add_row(*row)
+    console.print(shown, markup=False)
+    for note in table.notes:
+        console.print(note, style="dim", markup=False, highlight=False)
+    console.print()
+
+
+def _print_best(estimate: Estimate) -> None:
+    """The best answer as a transform with its frames named."""
+    import numpy as np
+
+    from hecbench import se3
+
+    if estimate.parent_T_camera is None:
+        return
+    parent_T_camera = estimate.parent_T_camera
+    translation = ", ".join(f"{value:.5f}" for value in parent_T_camera[:3, 3])
+    quaternion = ", ".join(f"{value:.6f}" for value in se3.to_quat_xyzw(parent_T_camera))
+    click.echo(f"{estimate.parent_link}_T_camera by {estimate.solver}:")
+    click.echo(f"  translation m: [{translation}]   quaternion x y z w: [{quaternion}]")
+    click.echo(np.array2string(parent_T_camera, precision=6, suppress_small=True, prefix="  "))

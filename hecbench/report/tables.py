@@ -1,0 +1,210 @@
+"""Tables of results as text cells, the same for the terminal and the HTML page."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from itertools import groupby
+
+import numpy as np
+
+from hecbench import statistics
+from hecbench.estimate import Estimate, Status
+from hecbench.statistics import Interval
+
+SUCCESS_MM, SUCCESS_RAD = 5.0, 0.01
+_NO_ANSWER = 1e12
+"""Stands for the error of a run without an answer, so that medians count every run."""
+
+
+@dataclass(frozen=True)
+class Table:
+    """Cells as text. The first `left` columns are words, the rest numbers."""
+
+    title: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    notes: tuple[str, ...] = field(default=())
+    left: int = 1
+
+
+@dataclass(frozen=True)
+class Group:
+    """The estimates of one level of a suite, or of one recording."""
+
+    title: str
+    estimates: tuple[Estimate, ...]
+    is_level: bool
+
+    @property
+    def by_solver(self) -> dict[str, list[Estimate]]:
+        """The estimates of each solver, by name."""
+        ordered = sorted(self.estimates, key=lambda e: e.solver)
+        return {solver: list(group) for solver, group in groupby(ordered, key=lambda e: e.solver)}
+
+
+def groups(estimates: Iterable[Estimate]) -> list[Group]:
+    """One group per level of each suite and per recording given by path."""
+
+    def place(estimate: Estimate) -> tuple[str, str]:
+        if estimate.level is not None:
+            return f"{estimate.suite}: {estimate.level}", "level"
+        return f"{estimate.recording} ({estimate.item})", "item"
+
+    ordered = sorted(estimates, key=place)
+    return [
+        Group(title, tuple(found), kind == "level") for (title, kind), found in groupby(ordered, key=place)
+    ]
+
+
+def table(group: Group) -> Table:
+    """The table of a group: statistics over runs for a level, one row of evidence per solver for a recording."""
+    return _level_table(group) if group.is_level else _recording_table(group.title, group.estimates)
+
+
+def error_mm(estimate: Estimate, name: str = "tre_mm") -> float:
+    """One error of a run; very large for a run without an answer, NaN where it was not measured."""
+    return float((estimate.errors or {}).get(name, np.nan)) if estimate.status is Status.OK else _NO_ANSWER
+
+
+def succeeded(estimate: Estimate) -> bool:
+    """Whether the camera centre and its rotation are within 5 mm and 0.01 rad."""
+    if estimate.status is not Status.OK or not estimate.errors:
+        return False
+    rotation_rad = np.deg2rad(estimate.errors["rotation_error_deg"])
+    return bool(estimate.errors["translation_error_mm"] <= SUCCESS_MM and rotation_rad <= SUCCESS_RAD)
+
+
+def _level_table(group: Group) -> Table:
+    medians = {
+        solver: statistics.bootstrap([error_mm(run) for run in runs], np.median)
+        for solver, runs in group.by_solver.items()
+    }
+    ranks = dict(zip(medians, statistics.shared_ranks(list(medians.values())), strict=True))
+    rows = []
+    for solver in sorted(medians, key=lambda s: (ranks[s], medians[s].value)):
+        runs = group.by_solver[solver]
+        answered = [run for run in runs if run.status is Status.OK]
+        successes = sum(map(succeeded, runs))
+        rows.append(
+            (
+                solver,
+                str(ranks[solver]),
+                f"{len(answered)} of {len(runs)}",
+                _interval(medians[solver]),
+                _number(np.mean([error_mm(run) for run in answered]) if answered else np.nan),
+                _number(np.median([error_mm(run, "translation_error_mm") for run in runs])),
+                _number(np.median([error_mm(run, "rotation_error_deg") for run in runs])),
+                f"{successes}/{len(runs)} {_percent(statistics.wilson(successes, len(runs)))}",
+                _number(1e3 * np.median([run.seconds for run in runs])),
+            )
+        )
+    return Table(
+        group.title,
+        (
+            "solver",
+            "rank",
+            "answered",
+            "TRE median mm [95 %]",
+            "TRE mean mm",
+            "camera centre median mm",
+            "rotation median deg",
+            f"within {SUCCESS_MM:g} mm, {SUCCESS_RAD:g} rad [95 %]",
+            "median ms",
+        ),
+        tuple(rows),
+        (
+            "TRE: rms displacement of workspace points. Medians and rates count every run, one without an answer "
+            "as infinitely wrong; the mean is over the answers. Ranks are shared where intervals overlap.",
+            *_reasons(group.estimates),
+        ),
+    )
+
+
+def _recording_table(title: str, estimates: Sequence[Estimate]) -> Table:
+    """One row per solver: held-out prediction and, where there is truth, errors."""
+    columns: list[tuple[str, Callable[[Estimate], str]]] = [
+        ("held-out px [95 %]", lambda e: _held_out(e, "reprojection_px")),
+        ("median px", lambda e: _number((e.held_out or {}).get("reprojection_px_median"))),
+        ("held-out mm [95 %]", lambda e: _held_out(e, "target_mm")),
+        ("median mm", lambda e: _number((e.held_out or {}).get("target_mm_median"))),
+        ("held-out deg", lambda e: _number((e.held_out or {}).get("target_deg"))),
+        ("spread deg", lambda e: _number(e.diagnostics.get("target_spread_deg"))),
+        ("spread mm", lambda e: _number(e.diagnostics.get("target_spread_mm"))),
+        ("TRE mm", lambda e: _number((e.errors or {}).get("tre_mm"))),
+        ("camera centre mm", lambda e: _number((e.errors or {}).get("translation_error_mm"))),
+        ("rotation deg", lambda e: _number((e.errors or {}).get("rotation_error_deg"))),
+        ("ms", lambda e: _number(1e3 * e.seconds)),
+    ]
+    cells = {name: [render(e) for e in estimates] for name, render in columns}
+    shown = [name for name, _ in columns if any(cell != _ABSENT for cell in cells[name])]
+    ranks = _held_out_ranks(estimates)
+    order = sorted(range(len(estimates)), key=lambda i: (ranks[i] or len(ranks) + 1, estimates[i].solver))
+    rows = tuple(
+        (
+            estimates[i].solver,
+            str(estimates[i].status),
+            str(ranks[i] or _ABSENT),
+            *(cells[name][i] for name in shown),
+        )
+        for i in order
+    )
+    notes = (
+        "Held-out: rms prediction of samples left out in 5 folds, the target pose refitted by the ruler. "
+        "Spread: rms deviation of the constant target pose over all samples, raw robot poses.",
+        *_reasons(estimates),
+    )
+    return Table(title, ("solver", "status", "rank", *shown), rows, notes, left=2)
+
+
+def _held_out_ranks(estimates: Sequence[Estimate]) -> list[int | None]:
+    """Shared ranks by held-out prediction, in pixels where there are pixels; None without one."""
+    for name in ("reprojection_px", "target_mm"):
+        known = [i for i, e in enumerate(estimates) if e.held_out and name in e.held_out]
+        if known:
+            intervals = [
+                Interval(held_out[name], *held_out[f"{name}_interval"])
+                for held_out in (estimates[i].held_out or {} for i in known)
+            ]
+            ranks = dict(zip(known, statistics.shared_ranks(intervals), strict=True))
+            return [ranks.get(i) for i in range(len(estimates))]
+    return [None] * len(estimates)
+
+
+def _reasons(estimates: Iterable[Estimate]) -> list[str]:
+    """For each solver with missing answers: how many of each status, and the first reason."""
+    reasons: dict[tuple[str, str], list[str]] = {}
+    for estimate in estimates:
+        if estimate.status is not Status.OK:
+            reasons.setdefault((estimate.solver, estimate.status), []).append(str(estimate.reason))
+    return [
+        f"{solver} {status}: {found[0]}"
+        if len(found) == 1
+        else f"{solver} {status} {len(found)} times, first: {found[0]}"
+        for (solver, status), found in sorted(reasons.items())
+    ]
+
+
+_ABSENT = "-"
+
+
+def _number(value: float | np.floating | None) -> str:
+    if value is None or np.isnan(value):
+        return _ABSENT
+    return "∞" if value >= _NO_ANSWER / 2 else f"{value:.3g}" if value < 1000 else f"{value:.0f}"
+
+
+def _interval(interval: Interval) -> str:
+    return f"{_number(interval.value)} [{_number(interval.low)}, {_number(interval.high)}]"
+
+
+def _percent(interval: Interval) -> str:
+    return f"[{100 * interval.low:.0f}, {100 * interval.high:.0f}] %"
+
+
+def _held_out(estimate: Estimate, name: str) -> str:
+    held_out = estimate.held_out or {}
+    if name not in held_out:
+        return _ABSENT
+    low, high = (np.nan if end is None else end for end in held_out[f"{name}_interval"])
+    return _interval(Interval(held_out[name], low, high))
