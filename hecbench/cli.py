@@ -147,7 +147,7 @@ def solve(
 ) -> None:
     """Calibrate one RECORDING; the best estimate comes first."""
     from hecbench import runner
-    from hecbench.estimate import Status
+    from hecbench.estimate import Status, best_first
     from hecbench.report.tables import Group, table
 
     loaded = _prepared(runner.load_recording(recording), views, init, seed)
@@ -156,7 +156,7 @@ def solve(
         raise HecbenchError(
             f"{recording}: no ready solver can use what it offers: {', '.join(sorted(loaded.offers()))}"
         )
-    estimates = runner.best_first(runner.solve(loaded, specs, _options(seed, held_out)))
+    estimates = best_first(runner.solve(loaded, specs, _options(seed, held_out)))
     for estimate in estimates if out else ():
         estimate.save(Path(str(out)) / f"{estimate.solver}.json")
     if as_json:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
@@ -131,6 +131,19 @@ class Estimate:
     def save(self, path: Path) -> None:
         """Write the JSON file, whole or not at all."""
         files.write_bytes(path, msgspec.json.format(msgspec.json.encode(self.to_json()), indent=1) + b"\n")
+
+
+def best_first(estimates: Sequence[Estimate]) -> list[Estimate]:
+    """Sorted by held-out prediction, else by error; answers without either come next, missing answers last."""
+
+    def score(estimate: Estimate) -> tuple[int, float]:
+        measured = {**(estimate.errors or {}), **(estimate.held_out or {})}
+        for name in ("reprojection_px", "target_mm", "tre_mm", "translation_error_mm"):
+            if measured.get(name) is not None:
+                return 0, measured[name]
+        return (1 if estimate.status is Status.OK else 2), 0.0
+
+    return sorted(estimates, key=score)
 
 
 def plain(value: Any) -> Any:

@@ -11,6 +11,7 @@ from hecbench.specs import (
     DeviceSpec,
     EvaluatorSpec,
     ExporterSpec,
+    ObserverSpec,
     SegmenterSpec,
     SolverSpec,
     SuiteSpec,
@@ -38,6 +39,12 @@ def hecbench_datasets() -> Iterable[DatasetSpec]:
 @hookspec
 def hecbench_suites() -> Iterable[SuiteSpec]:
     """Generated recordings by name and level."""
+    raise NotImplementedError
+
+
+@hookspec
+def hecbench_observers() -> Iterable[ObserverSpec]:
+    """Observations computed from rawer ones: corners from images, poses from corners."""
     raise NotImplementedError
 
 

@@ -1,5 +1,4 @@
-"""Plan = recordings x solvers -> estimates with their errors, one recording after the other or in parallel.
-"""
+"""Plan = recordings x solvers -> estimates with their errors, one recording after the other or in parallel."""
 
 from __future__ import annotations
 
@@ -7,6 +6,7 @@ import sys
 import traceback
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -20,8 +20,9 @@ from hecbench.errors import HecbenchError, InputError, Refusal, SolverFailure
 from hecbench.estimate import Estimate, Status, Termination
 from hecbench.recording import Recording
 from hecbench.robot import load_robot
-from hecbench.specs import DatasetSpec, EvaluatorSpec, Kind, Need, SolverSpec, SuiteSpec
+from hecbench.specs import DatasetSpec, EvaluatorSpec, Kind, Need, ObserverSpec, SolverSpec, SuiteSpec
 
+_OBSERVED = (Need.CORNERS, Need.TARGET_POSES)
 _HOW_TO_GIVE = {
     Need.TARGET_POSES: "samples[].camera_T_target, or corners_px with target and camera.K",
     Need.CORNERS: "samples[].corners_px",
@@ -70,6 +71,17 @@ def load_recording(path: Path) -> Recording:
     return found[0].load(path)
 
 
+def prepare(recording: Recording) -> Recording:
+    """Compute what is not given from what is: robot poses from joints, corners from images, poses from corners."""
+    recording = with_robot_poses(recording)
+    for need in _OBSERVED:
+        for observer in registry.load().ready(Kind.OBSERVER, ObserverSpec):
+            if observer.gives is need and observer.applies(recording):
+                with suppress(Refusal):  # the solvers that need it then refuse, with the same reason
+                    recording = observer.factory()(recording)
+    return recording
+
+
 def with_robot_poses(recording: Recording) -> Recording:
     """Fill a missing base_T_flange from the joints by the robot model's forward kinematics, where both are
     known.
@@ -90,7 +102,7 @@ def with_robot_poses(recording: Recording) -> Recording:
 def solve(recording: Recording, specs: Iterable[SolverSpec], options: Options = Options()) -> list[Estimate]:
     """One estimate of each solver, in the order given, with errors and held-out residuals."""
     origin = _provenance(recording, options)
-    recording = with_robot_poses(recording)
+    recording = prepare(recording)
     blind = recording.without_truth()
     estimates = []
     for spec in specs:
@@ -184,24 +196,6 @@ def _versions() -> dict[str, str]:
     python = f"{sys.version_info.major}.{sys.version_info.minor}.{sys.version_info.micro}"
     names = ("numpy", "scipy", "numba", "opencv-contrib-python-headless")
     return {"python": python} | {name: metadata.version(name) for name in names}
-
-
-def best_first(estimates: Sequence[Estimate]) -> list[Estimate]:
-    """Sorted by tre_mm where there is truth, else by held-out prediction; those without an answer last."""
-
-    def score(estimate: Estimate) -> tuple[int, float]:
-        held_out, errors = estimate.held_out or {}, estimate.errors or {}
-        for value in (
-            errors.get("tre_mm"),
-            errors.get("translation_error_mm"),
-            held_out.get("reprojection_px"),
-            held_out.get("target_mm"),
-        ):
-            if value is not None:
-                return 0, value
-        return (1 if estimate.status is Status.OK else 2), 0.0
-
-    return sorted(estimates, key=score)
 
 
 @dataclass(frozen=True)

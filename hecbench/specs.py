@@ -21,6 +21,7 @@ class Kind(StrEnum):
     SOLVER = "solver"
     DATASET = "dataset"
     SUITE = "suite"
+    OBSERVER = "observer"
     EVALUATOR = "evaluator"
     EXPORTER = "exporter"
     SEGMENTER = "segmenter"
@@ -89,6 +90,19 @@ class SuiteSpec(Spec):
     levels: tuple[str, ...]
     default_samples: int
     make: Callable[[str, int, int], Recording]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ObserverSpec(Spec):
+    """An observation computed from a rawer one, before any solver runs and once for all of them.
+
+    `factory()` returns a function recording -> recording that fills what `gives` names; it may raise `Refusal`.
+    """
+
+    kind: ClassVar[Kind] = Kind.OBSERVER
+    gives: Need
+    applies: Callable[[Recording], bool]
+    factory: Callable[[], Callable[[Recording], Recording]]
 
 
 @dataclass(frozen=True)
@@ -163,6 +177,7 @@ AnySpec = (
     SolverSpec
     | DatasetSpec
     | SuiteSpec
+    | ObserverSpec
     | EvaluatorSpec
     | ExporterSpec
     | SegmenterSpec

@@ -9,7 +9,7 @@ from itertools import groupby
 import numpy as np
 
 from hecbench import statistics
-from hecbench.estimate import Estimate, Status
+from hecbench.estimate import Estimate, Status, best_first
 from hecbench.statistics import Interval
 
 SUCCESS_MM, SUCCESS_RAD = 5.0, 0.01
@@ -114,8 +114,8 @@ def _level_table(group: Group) -> Table:
         ),
         tuple(rows),
         (
-            "TRE: rms displacement of workspace points. Medians and rates count every run, one without an answer "
-            "as infinitely wrong; the mean is over the answers. Ranks are shared where intervals overlap.",
+            "TRE: rms displacement of workspace points. Medians and rates count every run, one without an "
+            "answer as infinitely wrong; the mean is over the answers. Ranks are shared where intervals overlap.",
             *_reasons(group.estimates),
         ),
     )
@@ -123,6 +123,7 @@ def _level_table(group: Group) -> Table:
 
 def _recording_table(title: str, estimates: Sequence[Estimate]) -> Table:
     """One row per solver: held-out prediction and, where there is truth, errors."""
+    estimates = best_first(estimates)
     columns: list[tuple[str, Callable[[Estimate], str]]] = [
         ("held-out px [95 %]", lambda e: _held_out(e, "reprojection_px")),
         ("median px", lambda e: _number((e.held_out or {}).get("reprojection_px_median"))),
@@ -138,16 +139,9 @@ def _recording_table(title: str, estimates: Sequence[Estimate]) -> Table:
     ]
     cells = {name: [render(e) for e in estimates] for name, render in columns}
     shown = [name for name, _ in columns if any(cell != _ABSENT for cell in cells[name])]
-    ranks = _held_out_ranks(estimates)
-    order = sorted(range(len(estimates)), key=lambda i: (ranks[i] or len(ranks) + 1, estimates[i].solver))
     rows = tuple(
-        (
-            estimates[i].solver,
-            str(estimates[i].status),
-            str(ranks[i] or _ABSENT),
-            *(cells[name][i] for name in shown),
-        )
-        for i in order
+        (e.solver, str(e.status), rank, *(cells[name][i] for name in shown))
+        for i, (e, rank) in enumerate(zip(estimates, _held_out_ranks(estimates), strict=True))
     )
     notes = (
         "Held-out: rms prediction of samples left out in 5 folds, the target pose refitted by the ruler. "
@@ -157,18 +151,15 @@ def _recording_table(title: str, estimates: Sequence[Estimate]) -> Table:
     return Table(title, ("solver", "status", "rank", *shown), rows, notes, left=2)
 
 
-def _held_out_ranks(estimates: Sequence[Estimate]) -> list[int | None]:
-    """Shared ranks by held-out prediction, in pixels where there are pixels; None without one."""
+def _held_out_ranks(estimates: Sequence[Estimate]) -> list[str]:
+    """Shared ranks by held-out prediction, in pixels where there are pixels."""
     for name in ("reprojection_px", "target_mm"):
-        known = [i for i, e in enumerate(estimates) if e.held_out and name in e.held_out]
+        known = [i for i, e in enumerate(estimates) if name in (e.held_out or {})]
         if known:
-            intervals = [
-                Interval(held_out[name], *held_out[f"{name}_interval"])
-                for held_out in (estimates[i].held_out or {} for i in known)
-            ]
-            ranks = dict(zip(known, statistics.shared_ranks(intervals), strict=True))
-            return [ranks.get(i) for i in range(len(estimates))]
-    return [None] * len(estimates)
+            ranks = statistics.shared_ranks([_held_out_interval(estimates[i], name) for i in known])
+            texts = dict(zip(known, map(str, ranks), strict=True))
+            return [texts.get(i, _ABSENT) for i in range(len(estimates))]
+    return [_ABSENT] * len(estimates)
 
 
 def _reasons(estimates: Iterable[Estimate]) -> list[str]:
@@ -178,9 +169,7 @@ def _reasons(estimates: Iterable[Estimate]) -> list[str]:
         if estimate.status is not Status.OK:
             reasons.setdefault((estimate.solver, estimate.status), []).append(str(estimate.reason))
     return [
-        f"{solver} {status}: {found[0]}"
-        if len(found) == 1
-        else f"{solver} {status} {len(found)} times, first: {found[0]}"
+        f"{solver} {status}{f' {len(found)} times, first' if len(found) > 1 else ''}: {found[0]}"
         for (solver, status), found in sorted(reasons.items())
     ]
 
@@ -203,8 +192,10 @@ def _percent(interval: Interval) -> str:
 
 
 def _held_out(estimate: Estimate, name: str) -> str:
+    return _interval(_held_out_interval(estimate, name)) if name in (estimate.held_out or {}) else _ABSENT
+
+
+def _held_out_interval(estimate: Estimate, name: str) -> Interval:
     held_out = estimate.held_out or {}
-    if name not in held_out:
-        return _ABSENT
     low, high = (np.nan if end is None else end for end in held_out[f"{name}_interval"])
-    return _interval(Interval(held_out[name], low, high))
+    return Interval(held_out[name], low, high)

@@ -2,5 +2,9 @@
 
 from hecbench.registry import submodules
 
-plugin_modules = (*submodules(__name__, "solvers"), *submodules(__name__, "evaluators"))
+plugin_modules = (
+    *submodules(__name__, "solvers"),
+    *submodules(__name__, "observers"),
+    *submodules(__name__, "evaluators"),
+)
 """Modules whose hooks belong to this package, imported one by one when plugins are listed."""

@@ -7,8 +7,6 @@ be told from one image, but a motion turns hand and target by the same angle wha
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -25,7 +23,6 @@ _ROBUST_LIMIT = 25.0
 """A pair of samples costs at most (5 sigma)^2, so that one bad robot pose does not decide for the others."""
 
 
-@lru_cache(maxsize=8)
 def target_poses(recording: Recording) -> Array:
     """camera_T_target (N, 4, 4) m, NaN rows where the target is not seen; as given, else from `corners_px`.
 

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3, statistics
-from hecbench.errors import Refusal
 from hecbench.estimate import Estimate, Status
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Column, EvaluatorSpec, Need
-from hecbench_plugins.target_poses import project, target_poses
+from hecbench_plugins.target_poses import project
 
 Array = NDArray[np.float64]
 
@@ -36,11 +34,7 @@ def held_out(
     robot poses, identically for every solver, and predicts ``inverse(X) @ H @ Y`` for the left-out samples. A
     fold on which the solver gives no answer is counted in `failed_folds` and predicts nothing.
     """
-    try:
-        recording = replace(recording, camera_T_target=target_poses(recording))
-        hand = recording.hand_poses()
-    except Refusal as refusal:
-        return {"reason": str(refusal)}
+    hand = recording.hand_poses()
     assert recording.camera_T_target is not None
     usable = np.flatnonzero(
         np.isfinite(hand).all((1, 2)) & np.isfinite(recording.camera_T_target).all((1, 2))
@@ -125,5 +119,7 @@ def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
         columns=_COLUMNS,
         factory=lambda: held_out,
         reads_truth=False,
-        applies=lambda recording: Need.TARGET_POSES in recording.offers(),
+        applies=lambda recording: (
+            recording.camera_T_target is not None and recording.base_T_flange is not None
+        ),
     )

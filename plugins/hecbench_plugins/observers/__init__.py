@@ -1,0 +1,1 @@
+"""Observations computed from rawer ones before any solver runs, one kind per file."""
