@@ -24,6 +24,8 @@ _OUTER_ITERATIONS = 5
 _LEAST_REDUNDANCY = 10.0
 """Below it a group's noise cannot be told from its observations, and the given value is kept."""
 _LARGEST_CHANGE = 4.0
+_CORRELATED = 2.5
+"""Ratio of variances that independent noise exceeds in one of hundreds of recordings of ten samples."""
 _SETTLED = 0.02
 _NOISE_FLOOR = np.array([0.02, np.deg2rad(0.002), 2e-5])
 """px, rad, m: exact data must not make the weights infinite."""
@@ -36,7 +38,7 @@ class Solution:
     Attributes:
         covariance: of the shared unknowns [X, Y, scale?, parameters] (G, G).
         robot_covariances: of the increments of the robot poses (N, 6, 6).
-        redundancy: of the groups observed, rotation, translation: observations minus what the unknowns absorb.
+        redundancy: (3,) of observed, rotation, translation: observations minus what unknowns absorb.
     """
 
     state: State
@@ -142,19 +144,38 @@ def adjust_with_noise(
 ) -> Solution:
     """`adjust`, with the noise of each group re-estimated from its residuals, at most five times.
 
-    A group (observed, rotation, translation) that is `known` or whose redundancy is below 10 keeps the given noise; no change exceeds a factor of four at a time,
-    and none goes below a floor far under any real device's.
+    A group (observed, rotation, translation) that is `known` or whose redundancy is below 10 keeps the given
+    noise; no change exceeds a factor of four at a time, and none goes below a floor far under any device's.
     """
     solution = adjust(problem, state, noise)
     iterations = solution.iterations
     for _ in range(_OUTER_ITERATIONS):
         old = np.array([solution.noise.observed, solution.noise.rotation_rad, solution.noise.translation_m])
-        redundant = ~np.asarray(known) & (solution.redundancy >= _LEAST_REDUNDANCY)
-        factors = np.sqrt(solution.at.squares / np.where(redundant, solution.redundancy, 1.0))
-        factors = np.where(redundant, np.clip(factors, 1 / _LARGEST_CHANGE, _LARGEST_CHANGE), 1.0)
+        free = ~np.asarray(known) & (solution.redundancy >= _LEAST_REDUNDANCY)
+        factors = np.sqrt(solution.at.squares / np.where(free, solution.redundancy, 1.0))
+        factors[0] = np.sqrt(_observed_variance_factor(problem, solution))
+        factors = np.where(free, np.clip(factors, 1 / _LARGEST_CHANGE, _LARGEST_CHANGE), 1.0)
         new = np.where(old > 0, np.maximum(old * factors, _NOISE_FLOOR), 0.0)
         if (np.abs(new - old) <= _SETTLED * old).all():
             break
         solution = adjust(problem, solution.state, Noise(*new.tolist()))
         iterations += solution.iterations
     return replace(solution, iterations=iterations)
+
+
+def _observed_variance_factor(problem: Problem, solution: Solution) -> float:
+    """By how much the variance of an observed point is larger than assumed.
+
+    Only that part of a sample's residuals tells about X that a motion of the target would explain (6 numbers a
+    sample). A bent target or a wrong lens model errs alike in neighbouring points and puts more there than
+    independent noise would; the rest, much more numerous, would then promise a precision that is not there.
+    """
+    squares, redundancy = solution.at.squares[0], solution.redundancy[0]
+    within = problem.seen.sum() * problem.observed.shape[-1] - 6 * len(problem.observed)
+    as_motion = redundancy - within
+    if min(within, as_motion) >= _LEAST_REDUNDANCY:
+        factor_as_motion = solution.at.squares_as_motion / as_motion
+        factor_within = (squares - solution.at.squares_as_motion) / within
+        if factor_as_motion > _CORRELATED * factor_within:
+            return float(factor_as_motion)
+    return float(squares / max(redundancy, 1.0))

@@ -1,15 +1,16 @@
 """The model of reprojection bundle adjustment of X = parent_T_camera and Y = other_T_target.
 
-Ulrich and Hillemann 2024, "Uncertainty-aware hand-eye calibration", T-RO: besides X and Y every measured robot
-pose is an unknown that observes itself, and the noise of each group of observations is estimated with them.
-With the hand poses H of `Recording.hand_poses`, minimises
+Ulrich and Hillemann 2024, "Uncertainty-aware hand-eye calibration", T-RO: besides X and Y every measured
+robot pose is an unknown that observes itself, and the noise of each group of observations is estimated with
+them. With the hand poses H of `Recording.hand_poses`, minimises
 
-    sum rho(|u_ik - camera(inverse(X) H_i Y P_k)|^2 / s_px^2) + sum rho(|e_rot|^2 / s_rot^2 + |e_tr|^2 / s_tr^2)
+    sum rho(|u_ik - camera(inverse(X) H_i Y P_k)|^2 / s_px^2)
+        + sum rho(|e_rot|^2 / s_rot^2 + |e_tr|^2 / s_tr^2)
 
 with ``e_rot = log(R_measured^T R)``, ``e_tr = R_measured^T (t - t_measured)`` of base_T_flange, for both
-mountings, and Huber's rho. All increments act from the left in the parent frame, rotation first, so that the
-covariance is the project's; those of robot poses act in the flange frame. Every residual touches X, Y and one
-robot pose: the robot poses are eliminated by the Schur complement.
+mountings, and Huber's rho. Increments of X and Y act from the left in the parent frame, rotation first, so
+that the covariance is the project's; those of robot poses act in the flange frame. Every residual touches X, Y
+and one robot pose: the robot poses are eliminated by the Schur complement.
 """
 
 from __future__ import annotations
@@ -100,7 +101,7 @@ class State:
     scale: float = 1.0
 
     def moved(self, shared: Array, robot: Array) -> State:
-        """After increments of the shared unknowns [X, Y, scale?, parameters] and of the robot poses (N, 6)."""
+        """After increments of the shared unknowns [X, Y, scale?, parameters] and of robot poses (N, 6)."""
         rest = shared[12:]
         scale = self.scale
         if len(rest) > len(self.parameters):
@@ -131,6 +132,7 @@ class Linearisation:
             between them (N, G, 6).
         gradient_shared, gradient_robot: (G,) and (N, 6).
         squares: weighted whitened squares of the groups: observed, rotation, translation.
+        squares_as_motion: the part of the first that a motion of each sample's target would explain.
         prior_information: that the robot poses have of themselves (N, 6, 6), rotation and translation apart
             (2, N, 6, 6).
     """
@@ -144,6 +146,7 @@ class Linearisation:
     gradient_shared: Array
     gradient_robot: Array
     squares: Array
+    squares_as_motion: float
     prior_information: Array
 
 
@@ -194,6 +197,8 @@ def linearise(problem: Problem, state: State, noise: Noise) -> Linearisation:
 
     moved_by_robot = slice(6, 12) if problem.mounting is Mounting.EYE_TO_HAND else slice(0, 6)
     robot, gradient_robot = information[:, moved_by_robot, moved_by_robot], gradients[:, moved_by_robot]
+    motions = np.linalg.pinv(robot, hermitian=True) @ gradient_robot[..., None]
+    squares_as_motion = float((gradient_robot * motions[..., 0]).sum())
     corrections = robot_corrections(problem.base_T_flange, state.base_T_flange)
     own = np.zeros((2, count, 6, 6))
     if not noise.robot_is_exact:
@@ -220,6 +225,7 @@ def linearise(problem: Problem, state: State, noise: Noise) -> Linearisation:
         gradient_shared,
         gradient_robot,
         squares,
+        squares_as_motion,
         own,
     )
 

@@ -61,12 +61,12 @@ def motion_equations(A: Array, B: Array) -> Array:
 def unit_combination(first: Array, second: Array) -> tuple[Array, Array]:
     """The unit dual quaternion in the plane of two vectors (8,); Daniilidis 1999, eq. 33-35.
 
-    With ``s first + second``, ``x . x' = 0`` is a quadratic in s; of its roots the one with the larger real part
-    before scaling. A negative discriminant, which only noise gives, counts as zero.
+    With ``s first + second``, ``x . x' = 0`` is a quadratic in s; of its roots the one with the larger real
+    part before scaling. A negative discriminant, which only noise gives, counts as zero.
     """
     (u1, w1), (u2, w2) = (first[:4], first[4:]), (second[:4], second[4:])
     quadratic, linear, constant = u1 @ w1, u1 @ w2 + u2 @ w1, u2 @ w2
-    root = np.sqrt(max(linear**2 - 4 * quadratic * constant, 0.0))
+    root = np.sqrt(np.maximum(linear**2 - 4 * quadratic * constant, 0.0))
     stable = -(linear + (root if linear >= 0 else -root)) / 2
     # the roots are stable / quadratic and constant / stable; as pairs (s, weight of second) neither divides
     options = [np.array([stable, quadratic]), np.array([constant, stable])]
@@ -75,6 +75,6 @@ def unit_combination(first: Array, second: Array) -> tuple[Array, Array]:
         for s, weight in options
         if np.hypot(s, weight) > 0
     ] or [first, second]
-    best = max(candidates, key=lambda z: float(z[:4] @ z[:4]))
+    best: Array = max(candidates, key=lambda z: float(z[:4] @ z[:4]))
     best = best / np.linalg.norm(best[:4])
     return best[:4], best[4:] - (best[:4] @ best[4:]) * best[:4]

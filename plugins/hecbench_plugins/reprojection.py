@@ -1,4 +1,4 @@
-"""What the reprojection solvers share: OpenCV's camera with its derivatives, the problem, and where to start."""
+"""What the reprojection solvers share: OpenCV's camera with its derivatives, the problem, and the start."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from hecbench.recording import Recording
 from hecbench_plugins import single3d
 from hecbench_plugins.hand_eye import pose_pairs
 from hecbench_plugins.opencv_hand_eye import robot_world
-from hecbench_plugins.target_poses import MINIMUM_POINTS, planar_candidates
+from hecbench_plugins.target_poses import planar_candidates
 
 Array = NDArray[np.float64]
 

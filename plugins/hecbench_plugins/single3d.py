@@ -25,7 +25,7 @@ from hecbench_plugins.target_poses import target_poses
 Array = NDArray[np.float64]
 
 COPLANAR_CONDITION = 1e3
-"""Above it the marker positions nearly lie in a plane, and the closed form means nothing (healthy is about 5)."""
+"""Above it the marker positions nearly lie in a plane, and the closed form means nothing; healthy is 5."""
 _MAX_ITERATIONS = 100
 _CONVERGED_STEP = 1e-12
 
@@ -53,7 +53,7 @@ class MarkerPositions:
         marker = np.linalg.solve(e.M, e.P.T @ _vec(rotation) - e.T)
         hand_mean, points_mean = self.hand.mean(0), self.points_c.mean(0)
         translation = hand_mean[:3, 3] - rotation @ points_mean + hand_mean[:3, :3] @ marker
-        return se3.make(rotation, translation), marker
+        return se3.make(rotation, translation), np.asarray(marker)
 
     def residuals_m(self, parent_T_camera: Array, marker: Array) -> Array:
         """(N, 3) m."""
@@ -112,8 +112,8 @@ def marker_positions(recording: Recording) -> MarkerPositions:
     diversity_deg = rotation_diversity_deg(logs)
     if diversity_deg[1] < MINIMUM_ROTATION_DEG:
         raise Refusal(
-            f"the hand rotates by {diversity_deg[0]:.3g} deg rms about one axis and {diversity_deg[1]:.2g} about "
-            "any other: add samples turned by 20 deg or more about a second axis"
+            f"the hand rotates by {diversity_deg[0]:.3g} deg rms about one axis and {diversity_deg[1]:.2g} "
+            "about any other: add samples turned by 20 deg or more about a second axis"
         )
     return MarkerPositions(chosen, se3.transform_points(camera_T_target[both], marker[None])[:, 0])
 
@@ -135,8 +135,8 @@ def closed_form(positions: MarkerPositions, *, reference_projection: bool = Fals
 def iterate(positions: MarkerPositions) -> tuple[Array, int]:
     """R (3, 3) at the minimum, and the iterations.
 
-    Gauss-Newton from the closed form and from the best of the 24 rotations of a cube: where the closed form is
-    useless, the second start is not.
+    Gauss-Newton from the closed form and from the best of the 24 rotations of a cube: where the closed form
+    is useless, the second start is not.
     """
     e = positions.eliminated
     cube = Rotation.create_group("O").as_matrix()

@@ -1,5 +1,5 @@
-"""Ulrich and Hillemann 2024, "Uncertainty-aware hand-eye calibration" (T-RO): reprojection bundle adjustment in which
-robot poses are corrected and the noise of corners and robot is estimated with them.
+"""Ulrich and Hillemann 2024, "Uncertainty-aware hand-eye calibration" (T-RO): reprojection bundle
+adjustment in which robot poses are corrected and the noise of corners and robot is estimated with them.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ class IntrinsicsPrior:
 class Bundle:
     """The anchor among the marker-based methods: calibrated covariance, robot errors allowed for.
 
-    A noise that is None is estimated (variance components); defaults are 0.3 px, 0.05 deg, 0.5 mm where the data
-    cannot tell.
+    A noise that is None is estimated (variance components); where the data cannot tell, it is 0.3 px,
+    0.05 deg, 0.5 mm.
 
     Attributes:
         sigma_px: of a corner, per axis.

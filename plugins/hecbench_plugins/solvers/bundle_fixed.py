@@ -1,5 +1,5 @@
-"""Tabb and Ahmad Yousef 2017, "Solving the robot-world hand-eye(s) calibration problem with iterative methods", rp1:
-reprojection error over X and Y with the robot poses taken as exact.
+"""Tabb and Ahmad Yousef 2017, "Solving the robot-world hand-eye(s) calibration problem with iterative
+methods", rp1: reprojection error over X and Y with the robot poses taken as exact.
 """
 
 from __future__ import annotations

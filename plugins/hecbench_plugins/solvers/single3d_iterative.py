@@ -1,4 +1,6 @@
-"""Jin, Yu, Chen, Li 2024, "Hand-eye parameter estimation based on 3D observation of a single marker": iteration."""
+"""Jin, Yu, Chen, Li 2024, "Hand-eye parameter estimation based on 3D observation of a single marker" (TIM):
+the iteration.
+"""
 
 from __future__ import annotations
 

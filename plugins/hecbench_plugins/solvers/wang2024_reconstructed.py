@@ -1,8 +1,8 @@
-"""After Wang, Sun, Liu, Song 2024, "Dual quaternion operations for rigid body motion and their application to the
-hand-eye calibration" (MMT 193:105566); reconstructed from its abstract and follow-ups, not from its text or code.
+"""After Wang, Sun, Liu, Song 2024, "Dual quaternion operations for rigid body motion and their application to
+the hand-eye calibration" (MMT 193:105566); reconstructed from its abstract and follow-ups, not from its text.
 
-The dual-quaternion equation ``a x = x b`` is written with 8x8 matrices that keep the scalar rows which Daniilidis
-drops: equal on exact data, another weighting of noise.
+The dual-quaternion equation ``a x = x b`` is written with 8x8 matrices that keep the scalar rows which
+Daniilidis drops: equal on exact data, another weighting of noise.
 """
 
 from __future__ import annotations
@@ -46,7 +46,8 @@ class Wang2024:
     """Null space of the stacked 8x8 blocks, or their least squares over all unit dual quaternions.
 
     Attributes:
-        method: `nullspace`, closed form, or `qcqp` (Horn, Wodtko et al. 2023, the same cost without relaxation).
+        method: `nullspace`, closed form, or `qcqp`, the minimum over all unit dual quaternions (the cost of
+            Horn, Wodtko et al. 2023).
     """
 
     method: Method = Method.NULL_SPACE
@@ -89,14 +90,14 @@ def _without_half_turns(pairs: PosePairs) -> tuple[Array, Array]:
         or rotation_diversity_deg(pairs.rotation_logs[0][kept])[1:2].sum() < MINIMUM_ROTATION_DEG
     ):
         raise Refusal(
-            f"{(~kept).sum()} of {len(kept)} motions are half a turn, where quaternions lose their sign, and the "
-            "others do not rotate about two axes: add samples tilted by 20 to 60 deg"
+            f"{(~kept).sum()} of {len(kept)} motions are half a turn, where quaternions lose their sign, and "
+            "the others do not rotate about two axes: add samples tilted by 20 to 60 deg"
         )
     return A[kept], B[kept]
 
 
 def _least_squares(Q: Array) -> tuple[Array, Array]:
-    """The unit dual quaternion z that minimises ``z^T Q z``: Gauss-Newton on the manifold from four starts."""
+    """The unit dual quaternion z that minimises ``z^T Q z``: Gauss-Newton on the manifold, four starts."""
     starts = np.linalg.eigh(Q[:4, :4])[1].T
     found = [_descend(Q, np.concatenate([real, _best_dual(Q, real)])) for real in starts]
     best = min(found, key=lambda z: float(z @ Q @ z))
