@@ -1,4 +1,4 @@
-"""Analytic inverse kinematics against the forward kinematics: 10,000 poses per arm, all branches, at most 1e-9 m.
+"""Analytic inverse kinematics against the forward kinematics: 10,000 poses per arm, all branches, <= 1e-9 m.
 
 Run: ``.venv/bin/python -m pytest benchmarks/bench_robot_kinematics.py -p no:xdist --benchmark-only -s``.
 """

@@ -76,9 +76,11 @@ class RobotState:
     joint_speeds_rad_s: Array
     """(6,)"""
     base_T_flange: Array
+    """(4, 4), the controller's, with its factory calibration; ours while the tool offset is unknown."""
+    nominal_base_T_flange: Array
     """(4, 4), our forward kinematics of the joints with nominal lengths."""
     base_T_tcp: Array
-    """(4, 4), what the controller reports, with the lengths of its factory calibration."""
+    """(4, 4), the controller's."""
     wrench: Array
     """(6,) N and Nm at the tool, base axes."""
     robot_stamp_s: float

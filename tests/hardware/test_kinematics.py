@@ -1,17 +1,17 @@
-"""The analytic inverse against the forward kinematics, and both against an independent statement of the arm."""
+"""The analytic inverse against the forward kinematics, and both against screw axes."""
 
 from math import pi
 
 import numpy as np
 import pytest
+from hecbench_hardware.kinematics import ARMS, arm_named, wrap
 
 from hecbench import se3
 from hecbench.errors import InputError
-from hecbench_hardware.kinematics import ARMS, arm_named, wrap
 
 
 def product_of_exponentials(arm, joints):
-    """base_T_flange from screw axes at the zero pose (Lynch and Park 2017, eq. 4.14): no DH table involved."""
+    """base_T_flange from screw axes at the zero pose (Lynch and Park 2017, eq. 4.14), no DH table."""
     (a2, a3), (d1, d4, d5, d6) = arm.a_m, arm.d_m
     reach = a2 + a3
     points = np.array(

@@ -41,11 +41,8 @@ class RealSenseCamera:
                 f"{self.name} does not stream {width}x{height} at {rate_hz} Hz ({error}): try another size"
             ) from None
         self._optics = profile.get_stream(rs.stream.color).as_video_stream_profile().get_intrinsics()
-        self._model_is_plain = self._optics.model in (
-            rs.distortion.none,
-            rs.distortion.brown_conrady,
-            rs.distortion.modified_brown_conrady,
-        )
+        plain = (rs.distortion.none, rs.distortion.brown_conrady)
+        self._is_opencv = self._optics.model in plain or not any(self._optics.coeffs)
         for _ in range(_WARM_UP_FRAMES):
             self.grab()
         profile.get_device().first_color_sensor().set_option(rs.option.enable_auto_exposure, 0)
@@ -62,7 +59,7 @@ class RealSenseCamera:
 
     def intrinsics(self) -> CameraModel | None:
         """As calibrated in the factory; None for a lens model other than OpenCV's."""
-        if not self._model_is_plain:
+        if not self._is_opencv:
             return None
         optics = self._optics
         K = np.array([[optics.fx, 0, optics.ppx], [0, optics.fy, optics.ppy], [0, 0, 1]])

@@ -34,9 +34,9 @@ class UvcCamera:
         self._capture: Any = cv2.VideoCapture(int(device) if self._live else device)
         if not self._capture.isOpened():
             raise InputError(
-                f"{self.name} cannot be opened: check its number in /dev/video*, the path, and the permissions"
+                f"{self.name} cannot be opened: check its number in /dev/video* and the permissions"
             )
-        wanted = {cv2.CAP_PROP_BUFFERSIZE: 1, cv2.CAP_PROP_AUTOFOCUS: 0}
+        wanted: dict[int, float] = {cv2.CAP_PROP_BUFFERSIZE: 1, cv2.CAP_PROP_AUTOFOCUS: 0}
         if width and height:
             wanted |= {cv2.CAP_PROP_FRAME_WIDTH: width, cv2.CAP_PROP_FRAME_HEIGHT: height}
         if exposure is not None:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from hecbench.se3 import Array
 from hecbench_hardware.controller_sim.arm import HOME_RAD
 from hecbench_hardware.controller_sim.dashboard import Dashboard
 from hecbench_hardware.controller_sim.robotiq import RobotiqSocket
@@ -40,7 +41,8 @@ class Faults:
             "unreachable": lambda _: setattr(arm, "nothing_reachable", True),
             "contact": lambda x: setattr(arm, "contact_plane_m", x[0]),
             "push": lambda x: setattr(arm, "external_force_n", x[0]),
-            "hand": lambda x: program.push_by_hand(np.array(x)),
+            "place": self._place,
+            "hand": lambda x: program.push_by_hand(_six(x)),
             "program": lambda _: program.load("def other():\n sleep(3600)\nend\n"),
             "end_program": lambda _: program.kill(),
             "gripper_jam": lambda _: setattr(self.gripper, "jammed", True),
@@ -62,6 +64,9 @@ class Faults:
             return f"wrong numbers in '{line.strip()}'"
         return "ok"
 
+    def _place(self, joints_rad: list[float]) -> None:
+        self.dashboard.program.arm.joints = _six(joints_rad)
+
     def _local_mode(self) -> None:
         self.dashboard.remote = False
         self.dashboard.program.kill()
@@ -76,3 +81,9 @@ class Faults:
         arm.joints = np.array(HOME_RAD)
         vars(self.gripper).update(vars(RobotiqSocket()))
         self.dashboard.remote, self.stream_frozen = True, False
+
+
+def _six(joints_rad: list[float]) -> Array:
+    if len(joints_rad) != len(HOME_RAD):
+        raise ValueError
+    return np.array(joints_rad)

@@ -6,7 +6,7 @@ import selectors
 import socket
 import subprocess
 import sys
-from pathlib import Path
+from contextlib import suppress
 from types import TracebackType
 from typing import Self
 
@@ -59,17 +59,16 @@ class SimulatedController:
 
     def _start(self, host: str) -> None:
         version = ".".join(str(part) for part in self._version)
-        command = [sys.executable, "-m", "hecbench_hardware.controller_sim"]
+        command = [sys.executable, "-P", "-m", "hecbench_hardware.controller_sim"]
         self._process = subprocess.Popen(
             [*command, host, self._model, str(self._time_scale), version],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
             text=True,
-            cwd=Path(__file__).parent,
         )
         line = _first_line(self._process)
         if line != f"ready {host}":
-            code = self.stop()
+            code = self._ended() if line else self.stop()
             message = line or f"the simulated controller at {host} ended with code {code} before it was ready"
             raise InputError(message) if code == InputError.exit_code else HecbenchError(message)
 
@@ -81,6 +80,13 @@ class SimulatedController:
         if answer != "ok" and line != "log":
             raise InputError(answer)
         return answer
+
+    def _ended(self) -> int:
+        """The exit code of a process that is about to end by itself."""
+        assert self._process
+        with suppress(subprocess.TimeoutExpired):
+            self._process.wait(_STOP_S)
+        return self.stop()
 
     def stop(self) -> int:
         """End the process and return its exit code; harmless when it has ended."""

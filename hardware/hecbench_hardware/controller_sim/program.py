@@ -221,6 +221,8 @@ class ProgramRunner:
 
     def _motion(self, command: int) -> Motion:
         arm, target, (speed, acceleration) = self.arm, self._doubles(0), self._doubles(6, 2)
+        if not np.isfinite(self._doubles(0, 8)).all():
+            raise ScriptError("a motion needs finite numbers")
         if command == 1:
             return arm.move_joints(target, speed, acceleration)
         if command == 2:

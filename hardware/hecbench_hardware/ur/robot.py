@@ -80,10 +80,13 @@ class UrRobot:
         return self._as_state(self._stream.latest)
 
     def _as_state(self, sample: Sample) -> RobotState:
+        nominal = self.arm.forward(sample.joints)
+        tcp_T_flange = None if self.flange_T_tcp is None else se3.inverse(self.flange_T_tcp)
         return RobotState(
             joints_rad=sample.joints,
             joint_speeds_rad_s=sample.joint_speeds,
-            base_T_flange=self.arm.forward(sample.joints),
+            base_T_flange=nominal if tcp_T_flange is None else sample.base_T_tcp @ tcp_T_flange,
+            nominal_base_T_flange=nominal,
             base_T_tcp=sample.base_T_tcp,
             wrench=sample.wrench,
             robot_stamp_s=sample.controller_s,
@@ -98,13 +101,7 @@ class UrRobot:
         millimetres on a real arm, is part of every hand-eye error.
         """
         state = self.state()
-        gap: dict[str, float] = {}
-        if self.flange_T_tcp is not None:
-            ours = state.base_T_flange @ self.flange_T_tcp
-            gap = {
-                "kinematics_gap_mm": 1e3 * float(se3.translation_error_m(ours, state.base_T_tcp)),
-                "kinematics_gap_deg": float(np.degrees(se3.rotation_error_rad(ours, state.base_T_tcp))),
-            }
+        pair = state.base_T_flange, state.nominal_base_T_flange
         return {
             "model": self.arm.name,
             "host": self.host,
@@ -114,7 +111,8 @@ class UrRobot:
             "flange_T_tcp": None if self.flange_T_tcp is None else self.flange_T_tcp.tolist(),
             "base_T_tcp": state.base_T_tcp.tolist(),
             "joints_rad": state.joints_rad.tolist(),
-            **gap,
+            "kinematics_gap_mm": 1e3 * float(se3.translation_error_m(*pair)),
+            "kinematics_gap_deg": float(np.degrees(se3.rotation_error_rad(*pair))),
             "limits": asdict(self.limits),
         }
 

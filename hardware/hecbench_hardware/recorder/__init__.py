@@ -1,0 +1,1 @@
+"""Making recordings: a plan of poses, the motions, the frames, and a folder that survives a crash."""

@@ -1,0 +1,205 @@
+"""Poses worth recording: the target in view, within the limits, and turned about as many axes as possible.
+
+Hand-eye calibration needs rotations about different axes (Tsai and Lenz 1989, section on accuracy), so
+candidates are drawn in the camera's view and chosen one by one, each the furthest from those already chosen.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hecbench import se3
+from hecbench.errors import InputError
+from hecbench.recording import CameraModel, Mounting, Recording
+from hecbench.se3 import Array
+from hecbench_hardware import limits as bounds
+from hecbench_hardware.kinematics import UrArm
+from hecbench_hardware.limits import Limits
+
+_CANDIDATES = 3000
+_METRES_PER_RADIAN = 0.5
+"""How far apart in position counts as much as one radian of rotation when poses are compared."""
+_MARGIN = 0.05
+"""Share of the image at each edge that the target keeps clear of."""
+
+
+@dataclass(frozen=True)
+class View:
+    """From where the target may be seen."""
+
+    nearest: float = 0.7
+    furthest: float = 1.3
+    """Distances as multiples of the first sample's."""
+    tilt_rad: float = 0.7
+    """Largest angle between the optical axis and the target's normal."""
+    roll_rad: float = 1.5
+    """Largest turn about the optical axis."""
+
+
+def diverse_plan(
+    cell: Recording,
+    arm: UrArm,
+    limits: Limits,
+    count: int,
+    rng: np.random.Generator,
+    view: View | None = None,
+) -> Recording:
+    """A plan of `count` poses around the first sample of a cell.
+
+    Args:
+        cell: Describes camera, target and mounting, holds a rough `initial_parent_T_camera`, and in its first
+            sample the joints and `camera_T_target` at which the target is seen.
+        arm: The arm.
+        limits: Every pose and every path between two poses respects them.
+        count: How many poses.
+        rng: Draws the candidates.
+        view: From where.
+
+    Returns:
+        The cell with the planned joints and poses as its samples, in driving order, the first sample first.
+
+    Raises:
+        InputError: The cell lacks something, or fewer than `count` poses can be reached and seen.
+    """
+    seen, parent_T_camera, other_T_target, start = _seed(cell, arm)
+    camera, target = cell.camera, cell.target
+    assert camera
+    assert target
+    camera_T_target = _candidates(seen, view or View(), rng)
+    camera_T_target = camera_T_target[_in_view(camera_T_target, camera, target.points_m)]
+    hand = parent_T_camera @ camera_T_target @ se3.inverse(other_T_target)
+    base_T_flange = hand if cell.mounting is Mounting.EYE_TO_HAND else se3.inverse(hand)
+    joints = _reachable(base_T_flange, arm, start, limits)
+    chosen = [start]
+    for pick in _spread(arm.forward(joints), arm.forward(start), len(joints)):
+        if len(chosen) == count:
+            break
+        if _free_path(arm, start, joints[pick], limits):
+            chosen.append(joints[pick])
+    ordered = _short_tour(np.array(chosen), arm, limits)
+    if len(ordered) < count:
+        raise InputError(
+            f"{cell.name}: only {len(ordered)} of {count} poses can be reached and seen within the limits:"
+            " ask for fewer, widen the limits, or start from another pose"
+        )
+    return replace(
+        cell,
+        sample_ids=tuple(f"{i:06d}" for i in range(count)),
+        joints_rad=ordered,
+        base_T_flange=arm.forward(ordered),
+        camera_T_target=None,
+        corners_px=None,
+        images=None,
+        masks=None,
+        robot_stamp_s=None,
+        camera_stamp_s=None,
+    )
+
+
+def _seed(cell: Recording, arm: UrArm) -> tuple[Array, Array, Array, Array]:
+    """camera_T_target, parent_T_camera, other_T_target (4, 4) and joints (6,) of the first sample."""
+    needed = {
+        "camera.K": cell.camera and cell.camera.K,
+        "target": cell.target,
+        "initial_parent_T_camera": cell.initial_parent_T_camera,
+        "samples[0].joints_rad": cell.joints_rad,
+        "samples[0].camera_T_target": cell.camera_T_target,
+    }
+    for name, value in needed.items():
+        if value is None:
+            raise InputError(f"{cell.name}: planning poses needs {name}, roughly; add it to the cell")
+    assert cell.joints_rad is not None
+    assert cell.camera_T_target is not None
+    assert cell.initial_parent_T_camera is not None
+    start, seen = bounds.six_joints(cell.joints_rad[0]), cell.camera_T_target[0]
+    base_T_flange = arm.forward(start)
+    hand = base_T_flange if cell.mounting is Mounting.EYE_TO_HAND else se3.inverse(base_T_flange)
+    return seen, cell.initial_parent_T_camera, se3.inverse(hand) @ cell.initial_parent_T_camera @ seen, start
+
+
+def _candidates(seen: Array, view: View, rng: np.random.Generator) -> Array:
+    """Target poses (N, 4, 4) in the camera: distance, place in the image, tilt and roll drawn evenly."""
+    n = _CANDIDATES
+    distance = float(np.linalg.norm(seen[:3, 3])) * rng.uniform(view.nearest, view.furthest, n)
+    aside = rng.uniform(-0.6, 0.6, (n, 2))
+    position = distance[:, None] * np.column_stack([aside, np.ones(n)]) / np.hypot(1, aside)[:, :1]
+    azimuth, tilt = rng.uniform(-np.pi, np.pi, n), view.tilt_rad * np.sqrt(rng.uniform(0, 1, n))
+    axis = np.column_stack([np.cos(azimuth), np.sin(azimuth), np.zeros(n)])
+    roll = np.column_stack([np.zeros((n, 2)), rng.uniform(-view.roll_rad, view.roll_rad, n)])
+    rotation = se3.so3_exp(tilt[:, None] * axis) @ se3.so3_exp(roll) @ _faced(seen[:3, :3])
+    return se3.make(rotation, position)
+
+
+def _faced(camera_R_target: Array) -> Array:
+    """The rotation (3, 3) turned the shortest way until the target's normal is along the optical axis."""
+    normal = camera_R_target[:, 2]
+    axis = np.cross(normal, [0.0, 0.0, 1.0 if normal[2] >= 0 else -1.0])
+    sine = float(np.linalg.norm(axis))
+    turn = np.arctan2(sine, abs(normal[2])) / max(sine, 1e-12)
+    return np.asarray(se3.so3_exp(turn * axis) @ camera_R_target)
+
+
+def _in_view(camera_T_target: Array, camera: CameraModel, points_m: Array) -> Array:
+    """Which poses (N,) show the whole target, clear of the edges; distortion is left out."""
+    assert camera.K is not None
+    points = se3.transform_points(camera_T_target, points_m)
+    projected = points @ camera.K.T
+    depth = np.maximum(projected[..., 2:], 1e-9)
+    size = np.array([camera.width, camera.height])
+    inside = np.abs(projected[..., :2] / depth / size - 0.5) < 0.5 - _MARGIN
+    return np.asarray(inside.all(axis=(1, 2)))
+
+
+def _reachable(base_T_flange: Array, arm: UrArm, start: Array, limits: Limits) -> Array:
+    """The joints (M, 6) nearest to the start of every pose that has some within the limits."""
+    found = []
+    for pose in base_T_flange:
+        for joints in arm.inverse(pose, start)[:2]:
+            try:
+                bounds.check_path(arm, joints[None], limits)
+            except InputError:
+                continue
+            found.append(joints)
+            break
+    return np.array(found).reshape(-1, 6)
+
+
+def _spread(poses: Array, first: Array, count: int) -> list[int]:
+    """Indices of poses (M, 4, 4), each the furthest from the first pose and from those before it."""
+    order: list[int] = []
+    nearest = _apart(poses, first)
+    for _ in range(count):
+        pick = int(nearest.argmax())
+        order.append(pick)
+        nearest = np.minimum(nearest, _apart(poses, poses[pick]))
+    return order
+
+
+def _apart(poses: Array, other: Array) -> Array:
+    """How different poses (M, 4, 4) are from another, radians."""
+    turn, shift = se3.rotation_error_rad(poses, other), se3.translation_error_m(poses, other)
+    return np.asarray(np.hypot(turn, shift / _METRES_PER_RADIAN))
+
+
+def _short_tour(joints: Array, arm: UrArm, limits: Limits) -> Array:
+    """The same joints (N, 6), each followed by the nearest one left that it can move to freely."""
+    tour, left = [joints[0]], list(joints[1:])
+    while left:
+        left.sort(key=lambda there: float(np.abs(there - tour[-1]).max()))
+        for k, there in enumerate(left):
+            if _free_path(arm, tour[-1], there, limits):
+                tour.append(left.pop(k))
+                break
+        else:
+            break
+    return np.array(tour)
+
+
+def _free_path(arm: UrArm, start: Array, end: Array, limits: Limits) -> bool:
+    try:
+        bounds.check_path(arm, bounds.joint_path(start, end), limits)
+    except InputError:
+        return False
+    return True

@@ -1,0 +1,48 @@
+"""One simulated controller per test process, as new before every test, and the driver on it."""
+
+import numpy as np
+import pytest
+from hecbench_hardware.controller_sim.process import SimulatedController
+from hecbench_hardware.kinematics import ARMS
+from hecbench_hardware.ur.robot import UrRobot
+from hecbench_hardware.ur.stream import Supervision
+
+PATIENT = Supervision(max_age_s=1.0, late_s=1.0)
+"""A busy test machine delays the stream; a laboratory's does not."""
+
+
+@pytest.fixture(scope="session")
+def running_controller():
+    with SimulatedController(time_scale=50.0) as controller:
+        yield controller
+
+
+@pytest.fixture
+def controller(running_controller):
+    running_controller.fault("reset")
+    return running_controller
+
+
+@pytest.fixture
+def connect(controller):
+    """Connects read-only robots to the controller and closes them at the end."""
+    robots = []
+
+    def connected(supervision=PATIENT, **settings):
+        robots.append(UrRobot(controller.host, ARMS["ur5e"], supervision=supervision, **settings))
+        return robots[-1]
+
+    yield connected
+    for robot in robots:
+        robot.close()
+
+
+@pytest.fixture
+def robot(connect):
+    return connect().enable()
+
+
+@pytest.fixture
+def ready_pose():
+    """Joints away from singularities, tool down."""
+    return np.array([0.3, -1.4, 1.5, -1.6, -1.5, 0.2])
