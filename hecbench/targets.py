@@ -13,6 +13,12 @@ from hecbench.errors import InputError
 
 Array = NDArray[np.float64]
 
+ANY_TAG = -1
+"""The AprilTag id that stands for the only tag of its family in view; detection puts the true one there."""
+
+
+_LARGEST_GRID = 1000
+
 
 class Target:
     """Any target: its `kind` as recordings spell it, and its points (P, 3) m."""
@@ -64,8 +70,8 @@ class ChessboardTarget(Target):
     square_m: float
 
     def __post_init__(self) -> None:
-        _at_least("columns", self.columns, 2)
-        _at_least("rows", self.rows, 2)
+        _grid_size("columns", self.columns)
+        _grid_size("rows", self.rows)
         _positive("square_m", self.square_m)
 
     @cached_property
@@ -87,8 +93,8 @@ class CharucoTarget(Target):
     legacy: bool = False
 
     def __post_init__(self) -> None:
-        _at_least("columns", self.columns, 2)
-        _at_least("rows", self.rows, 2)
+        _grid_size("columns", self.columns)
+        _grid_size("rows", self.rows)
         _positive("square_m", self.square_m)
         _positive("marker_m", self.marker_m)
         if self.marker_m >= self.square_m:
@@ -132,6 +138,6 @@ def _positive(name: str, value: float) -> None:
         raise InputError(f"target.{name}: {value} is not a positive length in metres")
 
 
-def _at_least(name: str, value: int, least: int) -> None:
-    if value < least:
-        raise InputError(f"target.{name}: {value} is below {least}")
+def _grid_size(name: str, value: int) -> None:
+    if not 2 <= value <= _LARGEST_GRID:
+        raise InputError(f"target.{name}: {value} is not within 2 to {_LARGEST_GRID}")

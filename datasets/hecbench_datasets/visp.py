@@ -17,7 +17,7 @@ from hecbench.errors import InputError
 from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
 from hecbench.registry import hookimpl
 from hecbench.specs import DatasetSpec
-from hecbench.targets import AprilTagTarget, ChessboardTarget, Target
+from hecbench.targets import ANY_TAG, AprilTagTarget, ChessboardTarget, Target
 from hecbench_datasets.reading.hints import hinted_target, hints_for
 from hecbench_datasets.reading.sources import (
     IMAGE_SUFFIXES,
@@ -29,9 +29,6 @@ from hecbench_datasets.reading.sources import (
     text,
     yaml_value,
 )
-
-ONLY_TAG = -1
-"""The tag id that stands for "the only tag of its family in view"; detection puts the true one there."""
 
 _POSE = re.compile(r"pose_\w*?[rf]Pe\w*?(\d+)$")
 
@@ -111,7 +108,7 @@ def _target(path: Path) -> Target | None:
         family = re.search(r"(?:tag)?(36h11|25h9|16h5)", content)
         if size and family:
             tag = re.search(r"\bid:?\s*(\d+)", content, re.IGNORECASE)
-            return AprilTagTarget(f"tag{family[1]}", int(tag[1]) if tag else ONLY_TAG, float(size[1]))
+            return AprilTagTarget(f"tag{family[1]}", int(tag[1]) if tag else ANY_TAG, float(size[1]))
         if size and grid:
             return ChessboardTarget(int(grid[1]), int(grid[2]), float(size[1]))
     return None

@@ -1,0 +1,72 @@
+"""AprilTags by pupil-apriltags (Wang and Olson 2016, "AprilTag 2: efficient and robust fiducial detection").
+
+The library puts pixel centres at half integers and orders corners as the recording format does: bottom-left,
+bottom-right, top-right, top-left of the official tag.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hecbench.errors import InputError
+from hecbench.targets import ANY_TAG, AprilTagTarget
+
+Array = NDArray[np.float64]
+Grey = NDArray[np.uint8]
+
+FAMILIES = ("tag36h11", "tag25h9", "tag16h5", "tagCircle21h7", "tagStandard41h12")
+_MOST_WRONG_BITS = 2
+_LEAST_MARGIN = 20.0
+
+
+@cache
+def _detector(family: str, decimate: float) -> Any:
+    from pupil_apriltags import Detector
+
+    return Detector(families=family, nthreads=1, quad_decimate=decimate, refine_edges=1)
+
+
+def tags(grey: Grey, family: str) -> dict[int, Array]:
+    """Corners (4, 2) px by tag id, OpenCV's pixel centres; of tags seen twice the clearer one.
+
+    Raises:
+        InputError: the family is unknown.
+    """
+    if family not in FAMILIES:
+        raise InputError(f"target.family: '{family}' is not one of {', '.join(FAMILIES)}")
+    for decimate in (1.0, 2.0):
+        found = [
+            tag
+            for tag in _detector(family, decimate).detect(np.ascontiguousarray(grey))
+            if tag.hamming <= _MOST_WRONG_BITS and tag.decision_margin > _LEAST_MARGIN
+        ]
+        if found:
+            break
+    found.sort(key=lambda tag: tag.decision_margin)
+    return {int(tag.tag_id): np.asarray(tag.corners, float) - 0.5 for tag in found}
+
+
+def find(greys: list[Grey | None], target: AprilTagTarget) -> tuple[AprilTagTarget, list[Array | None]]:
+    """The tag's corners in each picture; a target of id `ANY_TAG` becomes the only tag in view.
+
+    Raises:
+        InputError: the tag is in no picture, or `ANY_TAG` does not single one out; the ids seen are listed.
+    """
+    seen = [{} if grey is None else tags(grey, target.family) for grey in greys]
+    counts = Counter(tag_id for found in seen for tag_id in found)
+    tag_id = target.id
+    if tag_id == ANY_TAG and len(counts) == 1:
+        tag_id = next(iter(counts))
+    if tag_id not in counts:
+        ids = ", ".join(f"{number} ({count}x)" for number, count in counts.most_common(8)) or "none"
+        wanted = "one tag only" if tag_id == ANY_TAG else f"id {tag_id}"
+        raise InputError(
+            f"target.id: expected {wanted} of {target.family} in {len(greys)} images, seen: {ids}; correct it"
+        )
+    resolved = AprilTagTarget(target.family, tag_id, target.size_m)
+    return resolved, [found.get(tag_id) for found in seen]

@@ -1,0 +1,71 @@
+"""Which of a grid's points is the first, when a board looks the same upside down: the hand motion tells.
+
+Between two samples the hand and the target turn by the same angle, whatever the calibration is; a board that
+was read upside down in one of them turns by another. One turn of all samples together stays free and does not
+matter: it only names the target's frame.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hecbench import se3
+
+Array = NDArray[np.float64]
+
+_ANGLE_SIGMA_RAD = np.deg2rad(2.0)
+_ROBUST_LIMIT = 25.0
+
+
+def unmirrored(grid: Array) -> Array:
+    """The grid (rows, columns, 2) with its columns reversed if it was seen from behind."""
+    x, y = grid[0, -1] - grid[0, 0], grid[-1, 0] - grid[0, 0]
+    return grid if x[0] * y[1] - x[1] * y[0] > 0 else grid[:, ::-1]
+
+
+def turned_grids(grid: Array) -> list[Array]:
+    """The grid (rows, columns, 2) read from each end: two ways, or four when it is square."""
+    quarters = range(4) if grid.shape[0] == grid.shape[1] else range(0, 4, 2)
+    return [np.rot90(grid, quarter) for quarter in quarters]
+
+
+def choose_turns(hand: Array, candidates: Array) -> NDArray[np.int64]:
+    """Which reading of each sample makes hand and target turn by the same angles.
+
+    Minimises the sum over pairs of the squared, limited difference of the angles, by coordinate descent from
+    the choices that agree best with each sample. Of the equal answers the one that turns fewest is given.
+
+    Args:
+        hand: H (N, 4, 4) m.
+        candidates: camera_T_target (N, K, 4, 4) m, one per reading.
+
+    Returns:
+        (N,) indices below K.
+    """
+    count, ways = candidates.shape[:2]
+    hand_angles = se3.rotation_error_rad(hand[:, None], hand[None])
+    angles = se3.rotation_error_rad(candidates[:, :, None, None], candidates[None, None])
+    gaps = (angles - hand_angles[:, None, :, None]) / _ANGLE_SIGMA_RAD
+    cost = np.minimum(gaps**2, _ROBUST_LIMIT)
+    each = np.arange(count)
+    cost[each, :, each, :] = 0.0
+
+    def energy(choice: NDArray[np.int64]) -> float:
+        return float(cost[each[:, None], choice[:, None], each, choice].sum())
+
+    def descend(choice: NDArray[np.int64]) -> NDArray[np.int64]:
+        for _ in range(ways * count):
+            costs = cost[:, :, each, choice].sum(2)
+            better = costs.argmin(1)
+            gains = costs[each, choice] - costs[each, better]
+            worst = int(gains.argmax())
+            if gains[worst] <= 1e-9:
+                break
+            choice = choice.copy()
+            choice[worst] = better[worst]
+        return choice
+
+    starts = (cost[i, 0].argmin(1) for i in range(count))
+    best = min((descend(start) for start in starts), key=energy)
+    return (best - np.bincount(best, minlength=ways).argmax()) % ways
