@@ -41,13 +41,13 @@ def corners(grey: Grey, columns: int, rows: int) -> Array | None:
 
 
 def _window(grid: Array) -> int:
-    """Half the refinement window, px: a third of the closest corners' distance, so that it holds one corner."""
+    """Half the refinement window, px: a third of the closest corners' distance, so that it holds one."""
     sides = [np.linalg.norm(np.diff(grid, axis=axis), axis=2).min() for axis in (0, 1)]
     return int(np.clip(min(sides) / 3, *_WINDOW_PX))
 
 
 def _first_square_is_light(grey: Grey, grid: Array) -> bool:
-    """Whether the squares between the corners that have the first one's colour are lighter than the others."""
+    """Whether the squares of the first one's colour are lighter than the others."""
     centres = (grid[:-1, :-1] + grid[1:, :-1] + grid[:-1, 1:] + grid[1:, 1:]) / 4
     x, y = np.rint(centres).astype(int).transpose(2, 0, 1)
     brightness = grey[np.clip(y, 0, grey.shape[0] - 1), np.clip(x, 0, grey.shape[1] - 1)].astype(float)

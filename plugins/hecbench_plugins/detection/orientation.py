@@ -68,4 +68,4 @@ def choose_turns(hand: Array, candidates: Array) -> NDArray[np.int64]:
 
     starts = (cost[i, 0].argmin(1) for i in range(count))
     best = min((descend(start) for start in starts), key=energy)
-    return (best - np.bincount(best, minlength=ways).argmax()) % ways
+    return np.asarray((best - np.bincount(best, minlength=ways).argmax()) % ways)
