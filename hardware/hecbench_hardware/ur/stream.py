@@ -142,6 +142,7 @@ class StateStream:
         self._worker.kill()
         self._thread.join()
         self._worker.end()
+        self.fault = DeviceFault(Fault.LINK_LOST, self._device, "it was closed")
 
     def _read(self) -> None:
         connection, limit_s = self._worker.connection, self._supervision.max_age_s

@@ -1,0 +1,107 @@
+"""Faults in the middle of a motion: a named state, one line, the arm at rest, and back to work."""
+
+import os
+import signal
+import threading
+
+import numpy as np
+import pytest
+from hecbench_hardware.devices import DeviceFault, Fault
+from hecbench_hardware.ur.stream import Supervision
+
+SLOW_RAD_S = 0.02
+MID_MOTION_S = 0.1
+
+
+def moved_into(robot, act):
+    """The fault that ends a motion during which `act` happens."""
+    actor = threading.Timer(MID_MOTION_S, act)
+    actor.start()
+    with pytest.raises(DeviceFault) as caught:
+        robot.move_joints(robot.state().joints_rad + np.eye(6)[0], speed_rad_s=SLOW_RAD_S)
+    actor.join()
+    assert "\n" not in str(caught.value)
+    return caught.value.fault
+
+
+@pytest.mark.parametrize(
+    ("verb", "fault"),
+    [
+        ("protective_stop", Fault.PROTECTIVE_STOP),
+        ("emergency_stop", Fault.EMERGENCY_STOP),
+        ("link_loss 0.2", Fault.LINK_LOST),
+        ("local_mode", Fault.LOCAL_MODE),
+        ("stale", Fault.STALE),
+        ("slow 0.001", Fault.LATE),
+        ("push 120", Fault.FORCE),
+        ("contact 0.6", Fault.PROTECTIVE_STOP),
+        ("end_program", Fault.PROGRAM_ENDED),
+    ],
+)
+def test_fault_in_motion_is_named_and_recovered_from(connect, controller, ready_pose, verb, fault):
+    robot = connect(supervision=Supervision(max_age_s=0.5, late_s=1.0, max_force_n=100)).enable()
+    seen = moved_into(robot, lambda: controller.fault(verb))
+    assert seen is fault or (verb.startswith("contact") and seen is Fault.FORCE)
+    if fault is not Fault.PROTECTIVE_STOP:
+        controller.fault("reset")
+    else:
+        controller.fault("contact -9")
+    asked = []
+    assert robot.recover(lambda line: not asked.append(line))
+    assert len(asked) == 1
+    robot.move_joints(ready_pose)
+    assert np.abs(robot.settle().joints_rad - ready_pose).max() < 1e-9
+
+
+def test_a_straight_line_into_the_unreachable(robot, controller):
+    controller.fault("unreachable")
+    target = robot.state().base_T_flange.copy()
+    target[2, 3] += 0.05
+    with pytest.raises(DeviceFault) as caught:
+        robot.move_linear(target)
+    assert caught.value.fault is Fault.PROGRAM_ENDED
+
+
+def test_the_operator_may_refuse(robot, controller, ready_pose):
+    assert moved_into(robot, lambda: controller.fault("protective_stop")) is Fault.PROTECTIVE_STOP
+    assert not robot.recover(lambda line: False)
+    with pytest.raises(DeviceFault) as caught:
+        robot.move_joints(ready_pose)
+    assert caught.value.fault is Fault.PROTECTIVE_STOP
+    assert robot.state().joints_rad.shape == (6,)
+
+
+def test_emergency_stop_must_be_released_first(robot, controller, monkeypatch):
+    monkeypatch.setattr("hecbench_hardware.ur.recovery._RELEASE_S", 0.2)
+    assert moved_into(robot, lambda: controller.fault("emergency_stop")) is Fault.EMERGENCY_STOP
+    with pytest.raises(DeviceFault, match="still pressed"):
+        robot.recover(lambda line: True)
+    with pytest.raises(DeviceFault):
+        robot.state()
+    controller.fault("release_emergency_stop")
+    assert robot.recover(lambda line: True)
+
+
+@pytest.mark.parametrize("role", ["_control", "_stream"])
+def test_a_dead_worker_is_a_lost_link_and_stops_the_arm(robot, connect, role):
+    watcher = connect()
+    assert moved_into(robot, lambda: os.kill(getattr(robot, role).pid, signal.SIGKILL)) is Fault.LINK_LOST
+    assert np.abs(watcher.settle().joint_speeds_rad_s).max() == 0
+
+
+def test_a_hanging_client_is_ended_and_the_arm_stopped(robot, connect):
+    """A stopped process answers as little as a library that hangs with the interpreter held."""
+    watcher = connect()
+    assert moved_into(robot, lambda: os.kill(robot._control.pid, signal.SIGSTOP)) is Fault.LINK_LOST
+    assert np.abs(watcher.settle().joint_speeds_rad_s).max() == 0
+    assert robot.recover(lambda line: True)
+
+
+def test_a_lost_link_while_reading(connect, controller):
+    robot = connect()
+    controller.fault("link_loss 0.1")
+    with pytest.raises(DeviceFault) as caught:
+        robot.settle()
+    assert caught.value.fault is Fault.LINK_LOST
+    with pytest.raises(DeviceFault):
+        robot.state()
