@@ -63,7 +63,7 @@ def load(path: Path) -> Recording:
             flange_link="panda_EE",
             joint_names=tuple(f"panda_joint{i}" for i in range(1, 8)),
         ),
-        camera=hints.camera and hints.camera.model(),
+        camera=hints.camera_model(),
     )
 
 

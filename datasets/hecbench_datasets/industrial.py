@@ -54,7 +54,7 @@ def load(path: Path) -> Recording:
         mounting=hints.mounting or (Mounting.EYE_TO_HAND if static else Mounting.EYE_IN_HAND),
         sample_ids=tuple(pose_file.stem for pose_file in pose_files),
         robot=RobotDescription(base_link="base_link", flange_link="tool0"),
-        camera=hints.camera.model() if hints.camera else _camera(content, file, images[0]),
+        camera=hints.camera_model() or _camera(content, file, images[0]),
         target=hinted_target(hints, hints_file) or _target(content, file),
         initial_parent_T_camera=None if guess is None else _pose(guess, file),
         base_T_flange=np.array([_pose(yaml_value(pose_file), pose_file) for pose_file in pose_files]),

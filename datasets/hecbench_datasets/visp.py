@@ -62,7 +62,7 @@ def load(path: Path) -> Recording:
         mounting=hints.mounting or _mounting(path),
         sample_ids=tuple(poses),
         robot=RobotDescription(base_link="panda_link0", flange_link="panda_EE"),
-        camera=hints.camera.model() if hints.camera else _camera(path),
+        camera=hints.camera_model() or _camera(path),
         target=hinted_target(hints, hints_file) or _target(path),
         base_T_flange=se3.from_rotvec(values[:, 3:], values[:, :3]),
         images=tuple(images.get(number) for number in poses),

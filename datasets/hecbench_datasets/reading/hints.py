@@ -40,9 +40,12 @@ class Hints(msgspec.Struct, forbid_unknown_fields=True):
     target_rotation: str | None = None
     target_unit: Literal["m", "mm"] | None = None
     time_offset_s: float | None = None
-    sequence: str | None = None
     camera: Camera | None = None
     target: dict[str, Any] | None = None
+
+    def camera_model(self) -> CameraModel | None:
+        """The camera, as recordings have it."""
+        return None if self.camera is None else self.camera.model()
 
 
 def hints_for(path: Path) -> tuple[Hints, Path]:
