@@ -28,7 +28,7 @@ class BaslerCamera:
         from pypylon import genicam, pylon
 
         self.name = f"camera Basler {serial}".strip()
-        self._pylon, self._genicam = pylon, genicam
+        self._genicam, self._count = genicam, 0
         factory = pylon.TlFactory.GetInstance()
         found = [info for info in factory.EnumerateDevices() if serial in ("", info.GetSerialNumber())]
         if not found:
@@ -59,13 +59,16 @@ class BaslerCamera:
 
     def grab(self, timeout_s: float = 2.0) -> Frame:
         """A frame that was exposed after the call."""
+        if not self._camera.IsOpen():
+            raise DeviceFault(Fault.CAMERA, self.name, "it is closed")
         try:
             with self._camera.GrabOne(int(timeout_s * 1e3)) as result:
                 if not result.GrabSucceeded():
                     raise DeviceFault(Fault.CAMERA, self.name, result.GetErrorDescription())
                 image = np.array(self._converter.Convert(result).GetArray(), np.uint8)
-                stamp_s = result.TimeStamp / _TICKS_PER_S
-                return Frame(image, time.time(), stamp_s, f"block {result.BlockID}")
+                self._count += 1
+                stamp_s = result.TimeStamp / _TICKS_PER_S or None
+                return Frame(image, time.time(), stamp_s, f"frame {self._count}")
         except self._genicam.GenericException:
             raise DeviceFault(Fault.CAMERA, self.name, f"no frame within {timeout_s:.1f} s") from None
 
