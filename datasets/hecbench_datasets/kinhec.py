@@ -1,8 +1,8 @@
 """KinHEC datasets (Parquet): one sequence is one recording, ``ROOT/noise-000000``.
 
 The package `kinhec` generates them (`kinhec generate --tier smoke --out ROOT`). The measured streams are
-read, paired at the camera's instants, and the truth is kept (X for a camera on the hand, Y for a fixed one, of
-its ``base_T_ee X = Y camera_T_target``). Frames without a measurement are left out.
+read, paired at the camera's instants, and the truth is kept (X for a camera on the hand, Y for a fixed one,
+of its ``base_T_ee X = Y camera_T_target``). Frames without a measurement are left out.
 """
 
 from __future__ import annotations
