@@ -60,7 +60,10 @@ def check_solver(spec: SolverSpec) -> list[Check]:
 
 
 def _outcome(check: Callable[[Solver], Iterator[str]], solver: Solver) -> tuple[bool, str]:
-    faults = list(check(solver))
+    try:
+        faults = list(check(solver))
+    except Exception as error:  # a crash is a fault like any other
+        return False, f"crashed with {type(error).__name__}: {error}"
     return not faults, faults[0] if faults else ""
 
 

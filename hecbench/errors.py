@@ -6,6 +6,9 @@ class HecbenchError(Exception):
 
     exit_code = 1
 
+    def __init__(self, message: str) -> None:
+        super().__init__(" ".join(message.split()))
+
 
 class InputError(HecbenchError):
     """Wrong usage or unreadable input. The command line exits with 2."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import io
 import zipfile
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 import numpy as np
@@ -22,6 +22,7 @@ FILE_NAME = "recording.json"
 ARRAYS_NAME = "samples.npz"
 
 Matrix = list[list[float]]
+Count = Annotated[int, msgspec.Meta(ge=0, le=100_000)]
 
 
 class _Strict(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
@@ -37,8 +38,8 @@ class _Robot(_Strict):
 
 
 class _Camera(_Strict):
-    width: int
-    height: int
+    width: Count
+    height: Count
     K: Matrix | None = None
     distortion: list[float] | None = None
 
@@ -48,14 +49,14 @@ class _Points(_Strict, tag_field="kind", tag="points"):
 
 
 class _Chessboard(_Strict, tag_field="kind", tag="chessboard"):
-    columns: int
-    rows: int
+    columns: Count
+    rows: Count
     square_m: float
 
 
 class _Charuco(_Strict, tag_field="kind", tag="charuco"):
-    columns: int
-    rows: int
+    columns: Count
+    rows: Count
     square_m: float
     marker_m: float
     dictionary: str
@@ -64,7 +65,7 @@ class _Charuco(_Strict, tag_field="kind", tag="charuco"):
 
 class _AprilTag(_Strict, tag_field="kind", tag="apriltag"):
     family: str
-    id: int
+    id: Count
     size_m: float
 
 

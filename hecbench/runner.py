@@ -72,7 +72,9 @@ def load_recording(path: Path) -> Recording:
 
 
 def prepare(recording: Recording) -> Recording:
-    """Compute what is not given from what is: robot poses from joints, corners from images, poses from corners."""
+    """Compute what is not given from what is: robot poses from joints, corners from images, poses from
+    corners.
+    """
     recording = with_robot_poses(recording)
     for need in _OBSERVED:
         for observer in registry.load().ready(Kind.OBSERVER, ObserverSpec):

@@ -135,7 +135,7 @@ def translation_error_m(a_T_b: ArrayLike, a_T_c: ArrayLike) -> Array:
 def is_transform(a_T_b: ArrayLike, tolerance: float = 1e-6) -> NDArray[np.bool_]:
     """Whether each (..., 4, 4) is finite and has a proper rotation and the last row 0 0 0 1."""
     a_T_b = np.asarray(a_T_b, float)
-    with np.errstate(invalid="ignore"):
+    with np.errstate(invalid="ignore", over="ignore"):
         rotation = a_T_b[..., :3, :3]
         deviation = np.abs(rotation @ np.swapaxes(rotation, -1, -2) - np.eye(3)).max((-1, -2))
         deviation = np.maximum(deviation, np.abs(a_T_b[..., 3, :] - [0, 0, 0, 1]).max(-1))

@@ -96,7 +96,8 @@ class SuiteSpec(Spec):
 class ObserverSpec(Spec):
     """An observation computed from a rawer one, before any solver runs and once for all of them.
 
-    `factory()` returns a function recording -> recording that fills what `gives` names; it may raise `Refusal`.
+    `factory()` returns a function recording -> recording that fills what `gives` names; it may raise
+    `Refusal`.
     """
 
     kind: ClassVar[Kind] = Kind.OBSERVER

@@ -39,7 +39,9 @@ def target_poses(recording: Recording) -> Array:
     if recording.base_T_flange is not None:
         hand = recording.hand_poses()
         decidable = seen & np.isfinite(hand).all((1, 2))
-        choice[decidable] = choose_by_motion(hand[decidable], poses[decidable], errors_px[decidable])
+        points = np.isfinite(recording.corners_px).all(-1).sum(-1)
+        misfit = points[:, None] * (errors_px / _PIXEL_SIGMA_PX) ** 2
+        choice[decidable] = choose_by_motion(hand[decidable], poses[decidable], misfit[decidable])
     return poses[np.arange(len(recording)), choice]
 
 
@@ -97,7 +99,7 @@ def _pnp(points_m: Array, corners_px: Array, camera: CameraModel, planar: bool) 
     return sorted(found, key=lambda pose_and_error: pose_and_error[1])
 
 
-def choose_by_motion(hand: Array, candidates: Array, errors_px: Array) -> NDArray[np.int64]:
+def choose_by_motion(hand: Array, candidates: Array, misfit: Array) -> NDArray[np.int64]:
     """Which of two target poses each sample has, so that hand and target turn by the same angles.
 
     Minimises the sum over pairs of the squared difference of rotation angles, each limited, plus the
@@ -107,25 +109,24 @@ def choose_by_motion(hand: Array, candidates: Array, errors_px: Array) -> NDArra
     Args:
         hand: H (N, 4, 4) m.
         candidates: camera_T_target (N, 2, 4, 4) m.
-        errors_px: rms reprojection errors (N, 2).
+        misfit: (N, 2) sums of squared reprojection errors over their variance.
 
     Returns:
         (N,) of 0 or 1.
     """
     count = len(hand)
     pair_cost = _motion_costs(hand, candidates)
-    own_cost = (errors_px / _PIXEL_SIGMA_PX) ** 2
     each = np.arange(count)
     starts = [np.zeros(count, int), *(pair_cost[i, k].argmin(1) for i in range(count) for k in range(2))]
 
     def energy(choice: NDArray[np.int64]) -> float:
         return float(
-            own_cost[each, choice].sum() + pair_cost[each[:, None], choice[:, None], each, choice].sum() / 2
+            misfit[each, choice].sum() + pair_cost[each[:, None], choice[:, None], each, choice].sum() / 2
         )
 
     def descend(choice: NDArray[np.int64]) -> NDArray[np.int64]:
         for _ in range(2 * count):
-            costs = own_cost + pair_cost[:, :, each, choice].sum(2)
+            costs = misfit + pair_cost[:, :, each, choice].sum(2)
             gains = costs[each, choice] - costs[each, 1 - choice]
             best = int(gains.argmax())
             if gains[best] <= 1e-9:

@@ -1,0 +1,79 @@
+"""Estimates: what they insist on, and their JSON form."""
+
+import json
+
+import numpy as np
+import pytest
+
+from hecbench import estimate as module
+from hecbench import se3
+from hecbench.errors import InputError
+from hecbench.estimate import Estimate, Status, Termination, best_first
+from hecbench.recording import CameraModel, Mounting
+
+SCHEMA_KEYS = [
+    "schema", "solver", "recording", "mounting", "parent_link", "camera", "status", "reason", "parent_T_camera",
+    "other_T_target", "covariance", "termination", "iterations", "renders", "seconds", "diagnostics", "extras",
+    "errors", "held_out", "provenance",
+]  # fmt: skip
+
+
+def test_json_has_the_keys_of_the_schema_in_order():
+    found = Estimate(np.eye(4)).to_json()
+    assert list(found) == SCHEMA_KEYS
+    assert found["schema"] == "hecbench.estimate/1"
+
+
+def test_file_round_trip(tmp_path, rng):
+    written = Estimate(
+        se3.exp(rng.normal(size=6)),
+        covariance=np.diag(np.arange(1.0, 7.0)),
+        termination=Termination.CONVERGED,
+        diagnostics={"spread": np.float64(1.5), "flags": np.array([True, False]), "none": np.nan},
+        camera=CameraModel(640, 480, np.array([[600.0, 0, 320], [0, 600, 240], [0, 0, 1]]), np.zeros(5)),
+        mounting=Mounting.EYE_IN_HAND,
+        held_out={"target_mm": 3.0},
+        suite="markers",
+        level="tag_2m",
+        item="000001",
+    )
+    written.save(tmp_path / "deep" / "park.json")
+    read = module.load(tmp_path / "deep" / "park.json")
+    assert read.to_json() == written.to_json()
+    assert read.diagnostics == {"spread": 1.5, "flags": [True, False], "none": None}
+    json.loads((tmp_path / "deep" / "park.json").read_text())
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({}, "status 'ok' with parent_T_camera None"),
+        ({"parent_T_camera": np.eye(4), "status": Status.REFUSED, "reason": "no"}, "status 'refused' with"),
+        ({"status": Status.FAILED}, "needs a reason"),
+        ({"parent_T_camera": np.diag([1, 1, -1, 1])}, "not a rigid transform"),
+        ({"parent_T_camera": np.full((4, 4), np.nan)}, "not a rigid transform"),
+        ({"parent_T_camera": np.eye(3)}, "not a rigid transform"),
+    ],
+)
+def test_inconsistent_estimates_are_refused(arguments, message):
+    with pytest.raises(InputError, match=message):
+        Estimate(**arguments)
+
+
+@pytest.mark.parametrize("content", [b"", b"{}", b'{"schema": "hecbench.estimate/2"}', b"\xff"])
+def test_bad_files_are_one_line(tmp_path, content):
+    path = tmp_path / "bad.json"
+    path.write_bytes(content)
+    with pytest.raises(InputError, match=r"bad.json: is not a hecbench.estimate/1") as caught:
+        module.load(path)
+    assert "\n" not in str(caught.value)
+
+
+def test_best_first_prefers_prediction_then_error_then_any_answer():
+    refused = Estimate(status=Status.REFUSED, reason="no", solver="refused")
+    bare = Estimate(np.eye(4), solver="bare")
+    good = Estimate(np.eye(4), solver="good", errors={"tre_mm": 1.0})
+    bad = Estimate(np.eye(4), solver="bad", errors={"tre_mm": 9.0})
+    assert [e.solver for e in best_first([refused, bad, bare, good])] == ["good", "bad", "bare", "refused"]
+    predicts = [Estimate(np.eye(4), solver=str(px), held_out={"reprojection_px": px}) for px in (2.0, 0.5)]
+    assert [e.solver for e in best_first(predicts)] == ["0.5", "2.0"]

@@ -1,0 +1,92 @@
+"""Plugins: ours are found, strangers' faults are data."""
+
+import sys
+from importlib import metadata
+
+import pytest
+
+from hecbench import registry
+from hecbench.errors import InputError
+from hecbench.registry import PluginStatus
+from hecbench.specs import Kind, SolverSpec
+
+GOOD = """
+from hecbench.registry import hookimpl
+from hecbench.specs import Need, SolverSpec
+
+@hookimpl
+def hecbench_solvers():
+    yield SolverSpec(name="{name}", summary="s", factory=lambda: None, needs=frozenset({{Need.CORNERS}}),
+                     imports={imports}, reference="r")
+"""
+
+
+@pytest.fixture
+def entry_point(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+
+    def make(module, source):
+        (tmp_path / f"{module}.py").write_text(source)
+        monkeypatch.delitem(sys.modules, module, raising=False)
+        return metadata.EntryPoint(module, module, "hecbench")
+
+    return make
+
+
+def found(*entry_points):
+    return {(p.name, p.status): p for p in registry.build(entry_points).plugins}
+
+
+def test_our_own_solvers_are_ready():
+    ready = {spec.name for spec in registry.load().ready(Kind.SOLVER, SolverSpec)}
+    assert {"tsai", "park", "horaud", "andreff", "daniilidis", "shah", "li"} <= ready
+    assert not [
+        p for p in registry.load().plugins if p.status in (PluginStatus.BROKEN, PluginStatus.CONFLICT)
+    ]
+
+
+def test_a_good_stranger_is_ready(entry_point):
+    plugins = found(entry_point("third_good", GOOD.format(name="third", imports="()")))
+    assert plugins["third", "ready"].row()["needs"] == ["corners"]
+
+
+@pytest.mark.parametrize(
+    ("source", "detail"),
+    [
+        ("raise RuntimeError('no licence')", "RuntimeError: no licence"),
+        ("def broken(:", "SyntaxError"),
+        ("import a_module_that_is_nowhere", "ModuleNotFoundError"),
+        (
+            GOOD.format(name="x", imports="()").replace("hecbench_solvers", "hecbench_slovers"),
+            "hecbench_slovers",
+        ),
+        (GOOD.format(name="x", imports="()").replace("yield SolverSpec(", "yield dict("), "expected a spec"),
+        (GOOD.format(name="x", imports="()").replace("yield", "1 / 0; yield"), "ZeroDivisionError"),
+        (GOOD.format(name="x", imports="()").replace("reference=", "refrence="), "TypeError"),
+    ],
+)
+def test_a_broken_stranger_is_listed_and_harms_nobody(entry_point, source, detail):
+    broken = entry_point("third_broken", source)
+    good = entry_point("third_fine", GOOD.format(name="fine", imports="()"))
+    plugins = found(broken, good)
+    assert ("fine", "ready") in plugins
+    assert detail in plugins["third_broken", "broken"].detail
+
+
+def test_a_missing_import_is_not_broken(entry_point):
+    plugins = found(entry_point("third_missing", GOOD.format(name="third", imports='("a_module_nowhere",)')))
+    assert "a_module_nowhere" in plugins["third", "missing"].detail
+
+
+def test_two_claims_on_one_name_are_refused(entry_point):
+    first = entry_point("third_one", GOOD.format(name="same", imports="()"))
+    second = entry_point("third_two", GOOD.format(name="same", imports="()"))
+    found_registry = registry.build([first, second])
+    assert [p.status for p in found_registry.plugins] == [PluginStatus.CONFLICT] * 2
+    with pytest.raises(InputError, match="'same' is conflict: the name is claimed by"):
+        found_registry.get(Kind.SOLVER, "same", SolverSpec)
+
+
+def test_unknown_names_are_answered_with_the_known_ones():
+    with pytest.raises(InputError, match=r"no solver is called 'tasi': choose one of .*tsai"):
+        registry.load().get(Kind.SOLVER, "tasi", SolverSpec)

@@ -1,0 +1,53 @@
+"""Intervals and tests against published or exact numbers."""
+
+import numpy as np
+import pytest
+
+from hecbench import statistics
+from hecbench.statistics import Interval
+
+
+def test_wilson_interval_of_the_paper_grasps():
+    rate = statistics.wilson(48, 54)
+    assert (rate.value, rate.low, rate.high) == pytest.approx((0.8889, 0.7781, 0.9481), abs=1e-3)
+    assert statistics.wilson(0, 10).low == 0.0
+
+
+def test_bootstrap_covers_the_mean_at_the_nominal_rate():
+    rng = np.random.default_rng(0)
+    hits = 0
+    for seed in range(200):
+        interval = statistics.bootstrap(rng.normal(3.0, 1.0, 40), seed=seed)
+        hits += interval.low <= 3.0 <= interval.high
+    assert 0.88 <= hits / 200 <= 0.99
+
+
+def test_bootstrap_of_one_value_has_no_interval():
+    interval = statistics.bootstrap([2.0], np.median)
+    assert interval.value == 2.0
+    assert np.isnan([interval.low, interval.high]).all()
+
+
+def test_cluster_bootstrap_is_wider_when_clusters_agree_within():
+    values = np.repeat([0.0, 1.0, 1.0, 0.0, 1.0, 1.0], 9)
+    clusters = np.repeat(np.arange(6), 9)
+    clustered, naive = statistics.cluster_bootstrap(values, clusters), statistics.bootstrap(values)
+    assert clustered.value == naive.value == pytest.approx(2 / 3)
+    assert clustered.high - clustered.low > 1.5 * (naive.high - naive.low)
+
+
+def test_paired_tests():
+    first, second = [True] * 48 + [False] * 6, [True] * 40 + [False] * 14
+    assert statistics.paired_success_p(first, second) == pytest.approx(2 * 0.5**8)
+    assert statistics.paired_success_p(first, first) == 1.0
+    errors = np.linspace(1, 2, 20)
+    assert statistics.paired_error_p(errors, errors + 0.5) < 1e-4
+    assert statistics.paired_error_p(errors, errors) == 1.0
+    with pytest.raises(ValueError, match="not pairs"):
+        statistics.paired_success_p([True], [True, False])
+
+
+def test_ranks_are_shared_where_intervals_overlap():
+    intervals = [Interval(1, 0.8, 1.2), Interval(1.1, 0.9, 1.3), Interval(5, 4, 6), Interval(4.5, 3, 9)]
+    assert statistics.shared_ranks(intervals) == [1, 1, 3, 3]
+    assert statistics.shared_ranks([Interval(2, np.nan, np.nan), Interval(1, np.nan, np.nan)]) == [2, 1]
