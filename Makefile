@@ -17,7 +17,7 @@ lint: .venv/dev
 	$(BIN)/lint-imports
 
 bench: .venv/dev
-	$(BIN)/python -m pytest benchmarks -p no:xdist --benchmark-only $(TEST_ARGS)
+	$(BIN)/python -m pytest benchmarks -p no:xdist --benchmark-only --timeout=0 -s $(TEST_ARGS)
 
 .venv/bin/python:
 	$(PYTHON) -m venv .venv
