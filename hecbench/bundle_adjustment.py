@@ -130,7 +130,7 @@ def _redundancy(
     problem: Problem, at: Linearisation, noise: Noise, covariance: Array, robot_covariances: Array
 ) -> Array:
     """(3,) of the groups observed, rotation, translation; together observations minus unknowns."""
-    absorbed = np.einsum("gnij,nji->g", at.prior_information, robot_covariances)
+    absorbed = np.einsum("gnij,nji->g", at.own_information, robot_covariances)
     known = len(problem.parameters)
     by_prior = (np.diagonal(covariance)[len(covariance) - known :] / problem.parameter_sigmas**2).sum()
     robot_unknowns = 0 if noise.robot_is_exact else 6 * len(at.robot)
@@ -166,16 +166,20 @@ def adjust_with_noise(
 def _observed_variance_factor(problem: Problem, solution: Solution) -> float:
     """By how much the variance of an observed point is larger than assumed.
 
-    Only that part of a sample's residuals tells about X that a motion of the target would explain (6 numbers a
-    sample). A bent target or a wrong lens model errs alike in neighbouring points and puts more there than
+    Only that part of a sample's residuals tells about X that a motion of the target would explain (6 numbers
+    each). A bent target or a wrong lens model errs alike in neighbouring points and puts more there than
     independent noise would; the rest, much more numerous, would then promise a precision that is not there.
     """
     squares, redundancy = solution.at.squares[0], solution.redundancy[0]
     within = problem.seen.sum() * problem.observed.shape[-1] - 6 * len(problem.observed)
     as_motion = redundancy - within
     if min(within, as_motion) >= _LEAST_REDUNDANCY:
-        factor_as_motion = solution.at.squares_as_motion / as_motion
-        factor_within = (squares - solution.at.squares_as_motion) / within
+        at = solution.at
+        gradients = at.gradients[:, at.robot_columns]
+        motions = np.linalg.pinv(at.mixed[:, at.robot_columns], hermitian=True) @ gradients[..., None]
+        explained = float((gradients * motions[..., 0]).sum())
+        factor_as_motion = explained / as_motion
+        factor_within = (squares - explained) / within
         if factor_as_motion > _CORRELATED * factor_within:
             return float(factor_as_motion)
     return float(squares / max(redundancy, 1.0))

@@ -9,8 +9,8 @@ them. With the hand poses H of `Recording.hand_poses`, minimises
 
 with ``e_rot = log(R_measured^T R)``, ``e_tr = R_measured^T (t - t_measured)`` of base_T_flange, for both
 mountings, and Huber's rho. Increments of X and Y act from the left in the parent frame, rotation first, so
-that the covariance is the project's; those of robot poses act in the flange frame. Every residual touches X, Y
-and one robot pose: the robot poses are eliminated by the Schur complement.
+that the covariance is the project's; those of robot poses act in the flange frame. Every residual touches X,
+Y and one robot pose: the robot poses are eliminated by the Schur complement.
 """
 
 from __future__ import annotations
@@ -128,26 +128,34 @@ class Linearisation:
         residuals: predicted minus observed (N, P, D), 0 where not seen.
         corrections: [e_rot, e_tr] of the robot poses (N, 6).
         cost: twice the negative log-likelihood, robust.
-        shared, robot, mixed: information of the shared unknowns (G, G), of each robot pose (N, 6, 6), and
-            between them (N, G, 6).
-        gradient_shared, gradient_robot: (G,) and (N, 6).
+        information: of each sample's observations about the shared unknowns (N, G, G).
+        gradients: of each sample's observations (N, G).
+        robot_columns: which of the shared unknowns move a sample's points as its robot pose does.
+        shared: information of the shared unknowns (G, G), with the prior of the sensor's parameters.
+        gradient_shared: (G,).
+        robot: information of each robot pose (N, 6, 6), with its own observation.
+        gradient_robot: (N, 6).
+        own_information: what robot poses know of themselves, rotation and translation apart (2, N, 6, 6).
         squares: weighted whitened squares of the groups: observed, rotation, translation.
-        squares_as_motion: the part of the first that a motion of each sample's target would explain.
-        prior_information: that the robot poses have of themselves (N, 6, 6), rotation and translation apart
-            (2, N, 6, 6).
     """
 
     residuals: Array
     corrections: Array
     cost: float
+    information: Array
+    gradients: Array
+    robot_columns: slice
     shared: Array
-    robot: Array
-    mixed: Array
     gradient_shared: Array
+    robot: Array
     gradient_robot: Array
+    own_information: Array
     squares: Array
-    squares_as_motion: float
-    prior_information: Array
+
+    @property
+    def mixed(self) -> Array:
+        """Information between the shared unknowns and each robot pose (N, G, 6)."""
+        return self.information[:, :, self.robot_columns]
 
 
 def predict(problem: Problem, state: State) -> tuple[Array, Array, Array]:
@@ -195,13 +203,11 @@ def linearise(problem: Problem, state: State, noise: Noise) -> Linearisation:
         gradient_shared[-known:] += prior / problem.parameter_sigmas
         cost += float(prior @ prior)
 
-    moved_by_robot = slice(6, 12) if problem.mounting is Mounting.EYE_TO_HAND else slice(0, 6)
-    robot, gradient_robot = information[:, moved_by_robot, moved_by_robot], gradients[:, moved_by_robot]
-    motions = np.linalg.pinv(robot, hermitian=True) @ gradient_robot[..., None]
-    squares_as_motion = float((gradient_robot * motions[..., 0]).sum())
-    corrections = robot_corrections(problem.base_T_flange, state.base_T_flange)
-    own = np.zeros((2, count, 6, 6))
+    columns = slice(6, 12) if problem.mounting is Mounting.EYE_TO_HAND else slice(0, 6)
+    robot, gradient_robot = information[:, columns, columns], gradients[:, columns]
+    corrections, own = np.zeros((count, 6)), np.zeros((2, count, 6, 6))
     if not noise.robot_is_exact:
+        corrections = robot_corrections(problem.base_T_flange, state.base_T_flange)
         sizes = corrections**2 * noise.robot_information
         robot_norms = np.sqrt(sizes.sum(1))
         robot_weights = _huber_weights(robot_norms, HUBER_ROBOT_SIGMAS)
@@ -219,14 +225,15 @@ def linearise(problem: Problem, state: State, noise: Noise) -> Linearisation:
         residuals,
         corrections,
         cost,
+        information,
+        gradients,
+        columns,
         shared,
-        robot,
-        information[:, :, moved_by_robot],
         gradient_shared,
+        robot,
         gradient_robot,
-        squares,
-        squares_as_motion,
         own,
+        squares,
     )
 
 

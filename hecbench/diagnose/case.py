@@ -1,0 +1,191 @@
+"""A recording under examination, and what several findings need of it, computed once."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hecbench import se3
+from hecbench.bundle_adjustment import Solution
+from hecbench.diagnose.fit import LEAST_SAMPLES, Fit, enclosing_points, fit
+from hecbench.errors import HecbenchError, SolverFailure
+from hecbench.recording import Mounting, Recording
+from hecbench.robot import load_robot
+
+Array = NDArray[np.float64]
+
+Observe = Callable[[Recording], Recording]
+"""Fills what is not given but computable: base_T_flange from joints, camera_T_target from corners."""
+
+_CHI2_MEDIAN = 5.35
+"""Median of chi-square with 6 degrees of freedom."""
+STANDS_OUT = 8.0
+"""Squared distance from what the others say, relative to the typical sample's."""
+_REFITS = 5
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """Findings read it; one that knows a cure hands on the cured case, so that the next ones see past the fault.
+
+    Attributes:
+        recording: as given.
+        observe: computes poses; called again where a finding asks what another camera would have given.
+        judged: False once the data cannot be fitted, with the reason in a finding.
+    """
+
+    recording: Recording
+    observe: Observe
+    judged: bool = True
+
+    @cached_property
+    def observed(self) -> Recording:
+        """The recording with all poses that can be computed."""
+        return self.observe(self.recording)
+
+    @cached_property
+    def usable(self) -> NDArray[np.int64]:
+        """Indices of the samples with a robot pose and a target pose."""
+        robot, target = self.observed.base_T_flange, self.observed.camera_T_target
+        if robot is None or target is None:
+            return np.zeros(0, int)
+        return np.flatnonzero(np.isfinite(robot).all((1, 2)) & np.isfinite(target).all((1, 2)))
+
+    @property
+    def base_T_flange(self) -> Array:
+        """(N, 4, 4) m of the usable samples."""
+        poses = self.observed.base_T_flange
+        assert poses is not None
+        return poses[self.usable]
+
+    @property
+    def camera_T_target(self) -> Array:
+        """(N, 4, 4) m of the usable samples."""
+        poses = self.observed.camera_T_target
+        assert poses is not None
+        return poses[self.usable]
+
+    @property
+    def focal_px(self) -> float | None:
+        """None when the intrinsics are unknown."""
+        camera = self.recording.camera
+        return None if camera is None or camera.K is None else float(np.sqrt(camera.K[0, 0] * camera.K[1, 1]))
+
+    @cached_property
+    def points_m(self) -> Array:
+        """Corners of the rectangle or box around the target."""
+        target = self.recording.target
+        return enclosing_points(None if target is None else target.points_m)
+
+    @property
+    def can_be_fitted(self) -> bool:
+        """Whether a calibration of these data means anything."""
+        return self.judged and len(self.usable) >= LEAST_SAMPLES
+
+    @cached_property
+    def fit(self) -> Fit | None:
+        """The calibration of the usable samples; None when there is none."""
+        if not self.can_be_fitted:
+            return None
+        return self.fit_of(self.base_T_flange, self.camera_T_target)
+
+    def fit_of(
+        self,
+        base_T_flange: Array,
+        camera_T_target: Array,
+        focal_px: float | None = None,
+    ) -> Fit | None:
+        """A calibration of other poses with this case's mounting and target."""
+        focal_px = focal_px or self.focal_px
+        return fit(self.recording.mounting, base_T_flange, camera_T_target, self.points_m, focal_px)
+
+    @cached_property
+    def agreed(self) -> tuple[Fit, NDArray[np.bool_]] | None:
+        """The calibration of the samples that agree, applied to all usable ones, and which these are (N,)."""
+        if self.fit is None:
+            return None
+        found, agreeing = self.fit, np.ones(len(self.usable), bool)
+        try:
+            for _ in range(_REFITS):
+                found = found.refitted_to(agreeing)
+                ratios = disagreement_ratios(found)
+                now = ratios <= STANDS_OUT
+                if now.sum() < max(LEAST_SAMPLES, len(now) // 2) or (now == agreeing).all():
+                    break
+                agreeing = now
+        except (SolverFailure, np.linalg.LinAlgError):
+            return None
+        return found, agreeing
+
+    @cached_property
+    def solution(self) -> Solution | None:
+        """The refined calibration of the samples that agree, with its covariance."""
+        if self.agreed is None:
+            return None
+        found, agreeing = self.agreed
+        try:
+            return found.subset(agreeing).refined()
+        except (SolverFailure, np.linalg.LinAlgError):
+            return None
+
+    @cached_property
+    def base_T_flange_by_joints(self) -> Array | None:
+        """(samples, 4, 4) m by forward kinematics, NaN where joints are absent; None without a known robot."""
+        robot, joints_rad = self.recording.robot, self.recording.joints_rad
+        if robot is None or joints_rad is None or not (robot.model or robot.urdf):
+            return None
+        poses = np.full((len(joints_rad), 4, 4), np.nan)
+        known = np.isfinite(joints_rad).all(1)
+        try:
+            model = load_robot(robot.urdf or str(robot.model), meshes=False)
+            poses[known] = model.forward(
+                joints_rad[known], robot.joint_names or None, base=robot.base_link, tip=robot.flange_link
+            )
+        except HecbenchError:
+            return None
+        return poses
+
+    @property
+    def noise_factor(self) -> float:
+        """How much noisier the agreeing samples are than the typical noise that weighs them."""
+        if self.agreed is None:
+            return 1.0
+        squares = self.agreed[0].disagreement()[0][self.agreed[1]]
+        return float(np.sqrt(np.median(squares) / _CHI2_MEDIAN))
+
+    def with_solved_scale(self) -> Case:
+        """The case with robot translations made to fit the declared target."""
+        assert self.solution is not None
+        poses = self.observed.base_T_flange
+        assert poses is not None
+        poses = poses.copy()
+        poses[:, :3, 3] /= self.solution.state.scale
+        return self.with_robot_poses(poses)
+
+    def ids(self, chosen: NDArray[np.integer] | NDArray[np.bool_]) -> tuple[str, ...]:
+        """Ids of some of the usable samples."""
+        return tuple(self.recording.sample_ids[i] for i in self.usable[chosen].tolist())
+
+    def with_robot_poses(self, base_T_flange: Array) -> Case:
+        """The case as it would be with other robot poses (samples, 4, 4)."""
+        return replace(self, recording=replace(self.recording, base_T_flange=base_T_flange))
+
+
+def disagreement_ratios(found: Fit) -> Array:
+    """Squared distances (N,) of the samples from what the others say, relative to the typical sample's."""
+    squares, _ = found.disagreement()
+    return np.asarray(squares / max(float(np.median(squares)), 0.1 * _CHI2_MEDIAN))
+
+
+def inverted(base_T_flange: Array) -> Array:
+    """The poses (samples, 4, 4) read in the other direction, NaN rows kept."""
+    return np.asarray(se3.inverse(base_T_flange))
+
+
+def other(mounting: Mounting) -> Mounting:
+    """The mounting that was not declared."""
+    return Mounting.EYE_IN_HAND if mounting is Mounting.EYE_TO_HAND else Mounting.EYE_TO_HAND

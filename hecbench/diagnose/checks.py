@@ -1,0 +1,66 @@
+"""All findings on a recording, in the order in which causes hide each other.
+
+Every file of a finding has `examine(case)`, which returns its finding and the case for the next ones: cured, where
+the fault has one obvious cure, so that one fault is named once instead of by all that suffer from it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from hecbench.diagnose import (
+    conditioning,
+    consistency,
+    coverage,
+    image_quality,
+    influence,
+    intrinsics,
+    joints_vs_pose,
+    next_pose,
+    outlier_sample,
+    pairing,
+    planar_ambiguity,
+    pose_direction_or_mounting,
+    rotation_diversity,
+    sample_moving,
+    target_scale,
+    units,
+)
+from hecbench.diagnose.case import Case, Observe
+from hecbench.diagnose.finding import Finding
+from hecbench.recording import Recording
+
+_STEPS: tuple[Callable[[Case], tuple[Finding | None, Case]], ...] = (
+    image_quality.examine,
+    joints_vs_pose.examine,
+    sample_moving.examine,
+    rotation_diversity.examine,
+    pose_direction_or_mounting.examine,
+    units.examine,
+    intrinsics.examine,
+    pairing.examine,
+    consistency.examine,
+    target_scale.examine,
+    outlier_sample.examine,
+    planar_ambiguity.examine,
+    coverage.examine,
+    conditioning.examine,
+    influence.examine,
+    next_pose.examine,
+)
+
+
+def check(recording: Recording, observe: Observe = lambda recording: recording) -> list[Finding]:
+    """Every finding that applies to this recording, in the order in which the causes hide each other.
+
+    Args:
+        recording: as it was read.
+        observe: fills base_T_flange from joints and camera_T_target from corners where they are missing
+            (`hecbench.runner.prepare`); the findings themselves need no OpenCV.
+    """
+    case, findings = Case(recording.without_truth(), observe), []
+    for examine in _STEPS:
+        finding, case = examine(case)
+        if finding is not None:
+            findings.append(finding)
+    return findings

@@ -1,0 +1,43 @@
+"""How well all samples agree on one calibration: the first answer to "is my calibration good?"."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from hecbench.diagnose.case import Case
+from hecbench.diagnose.finding import Finding, Severity
+
+ID = "consistency"
+LIMIT = 0.25
+"""Of the target's own motion in the image; data without a common calibration leave as much as it moves."""
+
+
+def examine(case: Case) -> tuple[Finding | None, Case]:
+    """The typical residual, as an angle of view turned into mm at the target."""
+    if not case.can_be_fitted:
+        return None, case
+    fit = case.fit
+    left = np.inf if fit is None else _relative(case)
+    if fit is None or left > LIMIT:
+        summary = "no calibration explains the poses"
+        if fit is not None:
+            summary += f": the typical sample is left with {100 * left:.0f} % of the target's motion"
+        action = (
+            "check how rotations are written (quaternion order, Euler order, degrees), that poses and images are "
+            "of the same moment, and that base_T_flange ends at one frame"
+        )
+        return Finding(ID, Severity.CRITICAL, summary, action, left, LIMIT), replace(case, judged=False)
+    summary = (
+        f"the typical sample agrees with one calibration to {fit.in_mm(fit.typical_px):.2g} mm "
+        f"({fit.typical_px:.2g} px) across the view"
+    )
+    return Finding(ID, Severity.OK, summary, value=left, limit=LIMIT), case
+
+
+def _relative(case: Case) -> float:
+    assert case.fit is not None
+    centres = case.fit.problem.observed.mean(1)
+    moved = float(np.median(np.linalg.norm(centres - np.median(centres, axis=0), axis=1)))
+    return case.fit.typical_px / max(moved, 1e-9)

@@ -1,0 +1,59 @@
+"""What `check` says about a recording."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+from hecbench.estimate import plain
+
+
+class Severity(StrEnum):
+    """How bad it is; `critical` means that no calibration from these data can be trusted."""
+
+    OK = "ok"
+    INFO = "info"
+    WARNING = "warning"
+    CRITICAL = "critical"
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One answer of `check`.
+
+    Attributes:
+        id: the kind of fault that was looked for.
+        severity: of what was found.
+        summary: one sentence with its numbers.
+        action: what to do; empty when nothing is to be done.
+        value: the number that decides, in the unit that the summary names.
+        limit: what it is compared with.
+        samples: ids of the samples concerned.
+    """
+
+    id: str
+    severity: Severity
+    summary: str
+    action: str = ""
+    value: float | None = None
+    limit: float | None = None
+    samples: tuple[str, ...] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        """JSON values by name."""
+        return {
+            "id": self.id,
+            "severity": str(self.severity),
+            "summary": self.summary,
+            "action": self.action,
+            "value": plain(self.value),
+            "limit": plain(self.limit),
+            "samples": list(self.samples),
+        }
+
+
+def names(samples: tuple[str, ...], most: int = 8) -> str:
+    """Sample ids for a sentence."""
+    shown = ", ".join(samples[:most])
+    return shown if len(samples) <= most else f"{shown} and {len(samples) - most} more"

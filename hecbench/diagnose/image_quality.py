@@ -1,0 +1,72 @@
+"""Images that cannot be read, are too dark or too bright, blurred, or the same twice."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hecbench.diagnose.case import Case
+from hecbench.diagnose.finding import Finding, Severity, names
+from hecbench.errors import InputError
+from hecbench.recording import Recording
+
+ID = "image_quality"
+LEAST_SHARPNESS = 0.1
+"""Of the median sharpness of all images."""
+_MOST_CLIPPED = 0.9
+_DARK, _BRIGHT = 8, 247
+_CURE = "look at these images; record these samples again"
+
+
+def examine(case: Case) -> tuple[Finding | None, Case]:
+    """Share of clipped pixels, sharpness around the target (mean squared Laplacian), and repeated images."""
+    recording = case.recording
+    indices = [i for i, source in enumerate(recording.images or ()) if source is not None]
+    if not indices:
+        return None, case
+    faults: dict[str, list[int]] = {
+        "unreadable": [],
+        "dark or overexposed": [],
+        "blurred": [],
+        "repeated": [],
+    }
+    sharpness: dict[int, float] = {}
+    seen: dict[bytes, int] = {}
+    for i in indices:
+        try:
+            grey = recording.image(i).mean(2)
+        except (InputError, OSError):
+            faults["unreadable"].append(i)
+            continue
+        if max((grey < _DARK).mean(), (grey > _BRIGHT).mean()) > _MOST_CLIPPED:
+            faults["dark or overexposed"].append(i)
+        elif (content := grey[::4, ::4].tobytes()) in seen:
+            faults["repeated"] += [seen[content], i]
+        else:
+            seen[content] = i
+        sharpness[i] = _sharpness(_around_target(recording, i, grey))
+    least = LEAST_SHARPNESS * float(np.median(list(sharpness.values()) or [0.0]))
+    faults["blurred"] = [i for i, value in sharpness.items() if value < least]
+    found = {kind: tuple(recording.sample_ids[i] for i in which) for kind, which in faults.items() if which}
+    if not found:
+        return Finding(ID, Severity.OK, f"{len(indices)} images are readable, exposed and sharp"), case
+    summary = "; ".join(f"{kind}: {names(which)}" for kind, which in found.items())
+    concerned = tuple(dict.fromkeys(sample for which in found.values() for sample in which))
+    return Finding(ID, Severity.WARNING, summary, _CURE, float(len(concerned)), 0.0, concerned), case
+
+
+def _around_target(recording: Recording, index: int, grey: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The part of an image that shows the target, or all of it."""
+    if recording.corners_px is None or not np.isfinite(recording.corners_px[index]).any():
+        return grey
+    low = np.maximum(np.nanmin(recording.corners_px[index], axis=0), 0).astype(int)
+    high = np.nanmax(recording.corners_px[index], axis=0).astype(int) + 1
+    part = grey[low[1] : high[1], low[0] : high[0]]
+    return part if min(part.shape) >= 3 else grey
+
+
+def _sharpness(grey: NDArray[np.float64]) -> float:
+    if min(grey.shape) < 3:
+        return 0.0
+    laplacian = grey[1:-1, :-2] + grey[1:-1, 2:] + grey[:-2, 1:-1] + grey[2:, 1:-1] - 4 * grey[1:-1, 1:-1]
+    return float((laplacian**2).mean())

@@ -1,0 +1,33 @@
+"""Which sample the answer hangs on: how far it moves when one is left out."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hecbench.diagnose.case import Case
+from hecbench.diagnose.finding import Finding, Severity
+from hecbench.diagnose.precision import precision
+
+ID = "influence"
+LIMIT = 3.0
+"""Times the expected error: leaving out one good sample does not move the answer that far."""
+
+
+def examine(case: Case) -> tuple[Finding | None, Case]:
+    """One Gauss-Newton step without each sample, as displacement in the workspace."""
+    found = precision(case)
+    if found is None or case.agreed is None or len(found.gradients) < 5:
+        return None, case
+    without = found.information.sum(0) - found.information
+    steps = np.linalg.solve(without, found.gradients[..., None])[:, :6, 0]
+    moved_mm = found.displacement_mm(steps)
+    worst = int(moved_mm.argmax())
+    concerned = (case.ids(case.agreed[1])[worst],)
+    value, limit = float(moved_mm[worst]), LIMIT * found.expected_mm()
+    summary = (
+        f"without sample {concerned[0]} the answer moves by {value:.2g} mm in the workspace, the most of all"
+    )
+    if value > limit:
+        action = "record more samples like this one, or look whether it is right"
+        return Finding(ID, Severity.WARNING, summary, action, value, limit, concerned), case
+    return Finding(ID, Severity.OK, summary, value=value, limit=limit, samples=concerned), case

@@ -1,0 +1,113 @@
+"""Intrinsics that belong to another resolution than the corners."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from hecbench.diagnose.case import Case
+from hecbench.diagnose.finding import Finding, Severity
+from hecbench.diagnose.fit import Fit
+from hecbench.recording import CameraModel, Recording
+
+ID = "intrinsics"
+OFF_CENTRE = 0.15
+"""Of the image's size; lenses are centred to a few per cent."""
+_RATIOS = (0.25, 1 / 3, 0.5, 2 / 3, 0.75, 0.8, 1.25, 4 / 3, 1.5, 2.0, 3.0, 4.0)
+_HALF = 0.5
+_SUSPICIOUS_PX = 4.0
+_SUSPICIOUS_SCALE = 0.02
+_BY_SIZE = "use the intrinsics of the resolution the images were taken at, or scale fx, fy, cx, cy"
+
+
+def examine(case: Case) -> tuple[Finding | None, Case]:
+    """The principal point against the image's centre; where suspicious, how rescaled intrinsics would fit."""
+    camera = case.recording.camera
+    if camera is None:
+        return None, case
+    if (size := _image_size(case.recording)) and size != (camera.width, camera.height):
+        summary = f"the images are {size[0]}x{size[1]} px, the camera {camera.width}x{camera.height}"
+        ratio = size[0] / camera.width
+        return Finding(ID, Severity.CRITICAL, summary, _BY_SIZE, ratio, 1.0), _cured(case, camera, ratio)
+    if camera.K is None:
+        return Finding(ID, Severity.INFO, "no intrinsics are given", "calibrate them from the images"), case
+    offset = float(np.abs(camera.K[:2, 2] / [camera.width, camera.height] - 0.5).max())
+    outside = _outside(case.recording)
+    fit = case.fit
+    suspicious = (
+        offset > OFF_CENTRE
+        or outside > 0
+        or (fit is not None and fit.typical_px > _SUSPICIOUS_PX)
+        or (fit is not None and abs(fit.state.scale - 1) > _SUSPICIOUS_SCALE)
+    )
+    if suspicious and case.recording.corners_px is not None and case.can_be_fitted:
+        best = min(_rescaled_fits(case, camera), key=lambda found: found[0], default=None)
+        if best is not None and best[0] < _HALF * _angle(fit, camera.K[0, 0]):
+            ratio, better = best[1], best[2]
+            summary = (
+                f"the intrinsics are of another resolution: times {ratio:.3g} the typical sample fits to "
+                f"{better.typical_px:.2g} px, as given to {fit.typical_px if fit else np.inf:.3g} px"
+            )
+            return Finding(ID, Severity.CRITICAL, summary, _BY_SIZE, ratio, 1.0), _cured(case, camera, ratio)
+    if outside:
+        summary = f"{outside} corners lie outside the {camera.width}x{camera.height} image"
+        return Finding(ID, Severity.CRITICAL, summary, _BY_SIZE, float(outside), 0.0), case
+    summary = f"the principal point is {100 * offset:.0f} % of the image's size from its centre"
+    if offset > OFF_CENTRE:
+        action = f"{_BY_SIZE}; for a cropped image this may be right"
+        return Finding(ID, Severity.WARNING, summary, action, offset, OFF_CENTRE), case
+    return Finding(ID, Severity.OK, summary, value=offset, limit=OFF_CENTRE), case
+
+
+def _image_size(recording: Recording) -> tuple[int, int] | None:
+    """Width and height of the first image file, without decoding it."""
+    from PIL import Image
+
+    first = next((source for source in recording.images or () if isinstance(source, Path)), None)
+    if first is None:
+        return None
+    try:
+        with Image.open(first) as picture:
+            return picture.size
+    except (OSError, SyntaxError, ValueError):  # damaged or absent: image_quality says so
+        return None
+
+
+def _outside(recording: Recording) -> int:
+    camera, corners = recording.camera, recording.corners_px
+    if camera is None or corners is None:
+        return 0
+    beyond = (corners < -1.0) | (corners > np.array([camera.width, camera.height]))
+    return int(beyond.any(-1).sum())
+
+
+def _scaled(camera: CameraModel, ratio: float) -> CameraModel:
+    assert camera.K is not None
+    K = camera.K.copy()
+    K[:2] *= ratio
+    return replace(camera, K=K)
+
+
+def _cured(case: Case, camera: CameraModel, ratio: float) -> Case:
+    if camera.K is None:
+        return case
+    width, height = round(camera.width * ratio), round(camera.height * ratio)
+    scaled = replace(_scaled(camera, ratio), width=width, height=height)
+    return replace(case, recording=replace(case.recording, camera=scaled))
+
+
+def _rescaled_fits(case: Case, camera: CameraModel) -> Iterator[tuple[float, float, Fit]]:
+    """Typical residual (rad) and the fit for every ratio that can be fitted."""
+    for ratio in _RATIOS:
+        scaled = _scaled(camera, ratio)
+        other = replace(case, recording=replace(case.recording, camera=scaled))
+        if other.fit is not None:
+            assert scaled.K is not None
+            yield _angle(other.fit, scaled.K[0, 0]), ratio, other.fit
+
+
+def _angle(fit: Fit | None, focal_px: float) -> float:
+    return np.inf if fit is None else fit.typical_px / focal_px

@@ -1,0 +1,84 @@
+"""Images paired with the wrong robot poses: all shifted by one, or some exchanged."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hecbench.diagnose.case import STANDS_OUT, Case
+from hecbench.diagnose.finding import Finding, Severity, names
+from hecbench.diagnose.fit import LEAST_SAMPLES
+from hecbench.diagnose.pose_direction_or_mounting import MUCH_BETTER
+
+ID = "pairing"
+_SHIFTS = (1, -1)
+
+
+def examine(case: Case) -> tuple[Finding | None, Case]:
+    """Residuals with the robot poses shifted by one sample; then exchanges among the samples that disagree."""
+    if case.fit is None or len(case.usable) <= LEAST_SAMPLES:
+        return None, case
+    as_given = case.fit.typical_px
+    for shift in _SHIFTS:
+        target, robot = _shifted(len(case.usable), shift)
+        moved = case.fit_of(case.base_T_flange[robot], case.camera_T_target[target])
+        if moved is not None and moved.typical_px < MUCH_BETTER * as_given:
+            which = "next" if shift > 0 else "previous"
+            summary = (
+                f"every image belongs to the robot pose of the {which} sample: the typical sample then fits to "
+                f"{moved.typical_px:.2g} px, as given to {as_given:.3g} px"
+            )
+            action = f"shift the robot poses by one against the images; drop the {'last' if shift > 0 else 'first'}"
+            value, limit = moved.typical_px, MUCH_BETTER * as_given
+            return Finding(ID, Severity.CRITICAL, summary, action, value, limit), _repaired(
+                case, target, robot
+            )
+    if swaps := _exchanged(case):
+        order = np.arange(len(case.usable))
+        for a, b in swaps:
+            order[[a, b]] = b, a
+        concerned = case.ids(np.array(swaps).ravel())
+        pairs = "; ".join(f"{' and '.join(case.ids(np.array(pair)))}" for pair in swaps)
+        summary = f"the robot poses of samples {pairs} are exchanged: each fits the image of the other"
+        action = f"exchange the robot poses of {names(concerned)}"
+        finding = Finding(ID, Severity.CRITICAL, summary, action, float(len(swaps)), 0.0, concerned)
+        return finding, _repaired(case, np.arange(len(order)), order)
+    return Finding(ID, Severity.OK, "no shift or exchange of robot poses fits better", value=as_given), case
+
+
+def _shifted(count: int, shift: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Indices of the images, and of the robot poses that belong to them."""
+    first, second = np.arange(count - 1), np.arange(1, count)
+    return (first, second) if shift > 0 else (second, first)
+
+
+def _exchanged(case: Case) -> list[tuple[int, int]]:
+    """Pairs of samples that disagree as given and agree with each other's robot pose."""
+    if case.agreed is None:
+        return []
+    found, agreeing = case.agreed
+    odd = np.flatnonzero(~agreeing)
+    squares, _ = found.disagreement()
+    typical = float(np.median(squares))
+    pairs: list[tuple[int, int]] = []
+    taken: set[int] = set()
+    for k, a in enumerate(odd.tolist()):
+        for b in odd[k + 1 :].tolist():
+            if {a, b} & taken:
+                continue
+            crossed = found.with_robot_poses(case.base_T_flange[[b, a]], np.array([a, b])).disagreement()[0]
+            if (crossed <= STANDS_OUT * typical).all():
+                pairs.append((a, b))
+                taken |= {a, b}
+    return pairs
+
+
+def _repaired(case: Case, target: NDArray[np.int64], robot: NDArray[np.int64]) -> Case:
+    """The case in which images `target` have the robot poses `robot`, both indices of usable samples."""
+    observed = case.observed
+    assert observed.base_T_flange is not None
+    poses = observed.base_T_flange[case.usable[robot]]
+    kept = replace(case.recording.subset(case.usable[target]), base_T_flange=poses, joints_rad=None)
+    return replace(case, recording=kept)

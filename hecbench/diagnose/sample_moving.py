@@ -1,0 +1,86 @@
+"""Samples taken while the arm moved: image and robot pose are of different moments."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hecbench import se3
+from hecbench.diagnose.case import Case
+from hecbench.diagnose.finding import Finding, Severity, names
+from hecbench.diagnose.joints_vs_pose import agreement
+
+Array = NDArray[np.float64]
+
+ID = "sample_moving"
+LIMIT_MM = 2.0
+LIMIT_DEG = 0.2
+LIMIT_LAG_S = 0.05
+_TIMES_TYPICAL = 6.0
+_CURE = "wait until the arm stands still before taking image and pose, and record these samples again"
+
+
+def examine(case: Case) -> tuple[Finding | None, Case]:
+    """Joints against poses, and the stamps of camera and robot against the arm's speed between samples."""
+    finding = _by_joints(case) or _by_stamps(case)
+    if finding is None:
+        return None, case
+    return finding, case
+
+
+def _by_joints(case: Case) -> Finding | None:
+    found = agreement(case)
+    if found is None or not found.holds:
+        return None
+    typical_deg, typical_mm = found.typical
+    off = (found.millimetres > max(LIMIT_MM, _TIMES_TYPICAL * typical_mm)) | (
+        found.degrees > max(LIMIT_DEG, _TIMES_TYPICAL * typical_deg)
+    )
+    if not off.any():
+        return None
+    concerned = tuple(case.recording.sample_ids[i] for i in found.indices[off].tolist())
+    worst = float(found.millimetres[off].max())
+    summary = (
+        f"joints and robot pose of sample {names(concerned)} are of different moments: up to {worst:.2g} mm and "
+        f"{found.degrees[off].max():.2g} deg apart, elsewhere {typical_mm:.2g} mm"
+    )
+    return Finding(ID, Severity.CRITICAL, summary, _CURE, worst, LIMIT_MM, concerned)
+
+
+def _by_stamps(case: Case) -> Finding | None:
+    recording = case.recording
+    poses, robot, camera = recording.base_T_flange, recording.robot_stamp_s, recording.camera_stamp_s
+    if poses is None or robot is None or camera is None:
+        return None
+    known = np.flatnonzero(np.isfinite(poses).all((1, 2)) & np.isfinite(robot) & np.isfinite(camera))
+    if len(known) < 3:
+        return None
+    lags = camera[known] - robot[known]
+    lags = np.abs(lags - np.median(lags))
+    speed_m, speed_rad = _speeds(poses[known], robot[known])
+    moved_mm, moved_deg = 1e3 * speed_m * lags, np.rad2deg(speed_rad * lags)
+    off = (lags > LIMIT_LAG_S) & ((moved_mm > LIMIT_MM) | (moved_deg > LIMIT_DEG))
+    worst = float(lags.max())
+    if not off.any():
+        summary = (
+            f"image and robot pose of each sample are at most {1e3 * worst:.2g} ms apart beyond the usual"
+        )
+        return Finding(ID, Severity.OK, summary, value=worst, limit=LIMIT_LAG_S)
+    concerned = tuple(recording.sample_ids[i] for i in known[off].tolist())
+    summary = (
+        f"image and robot pose of sample {names(concerned)} are up to {1e3 * worst:.3g} ms farther apart than usual, "
+        f"in which the arm moves by up to {moved_mm[off].max():.2g} mm and {moved_deg[off].max():.2g} deg"
+    )
+    return Finding(ID, Severity.CRITICAL, summary, _CURE, worst, LIMIT_LAG_S, concerned)
+
+
+def _speeds(base_T_flange: Array, stamps_s: Array) -> tuple[Array, Array]:
+    """Mean speeds (N,) m/s and rad/s to the neighbouring samples, the faster of the two."""
+    order = np.argsort(stamps_s, kind="stable")
+    poses, seconds = base_T_flange[order], np.maximum(np.diff(stamps_s[order]), 1e-3)
+    linear = se3.translation_error_m(poses[:-1], poses[1:]) / seconds
+    angular = se3.rotation_error_rad(poses[:-1], poses[1:]) / seconds
+    fastest = np.zeros((2, len(order)))
+    for row, speeds in zip(fastest, (linear, angular), strict=True):
+        row[order] = np.maximum(np.append(speeds, 0.0), np.append(0.0, speeds))
+    return fastest[0], fastest[1]
