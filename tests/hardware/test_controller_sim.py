@@ -271,7 +271,7 @@ def test_wire_protocol(raw, controller):
     raw.send(frame("U", b"\x01\x00"))
     raw.send(frame("U", b"\x09"))
     assert raw("V", struct.pack(">H", 2)) == b"\x01"
-    log = controller.fault("log")
+    log = controller.ask("log")
     assert "input recipe 1: 1 bytes, expected 4" in log
     assert "input recipe 9 does not exist" in log
 

@@ -5,6 +5,7 @@ The port is the simulation's own (a real controller has none). Times are seconds
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
@@ -22,8 +23,8 @@ class Faults:
 
     dashboard: Dashboard
     gripper: RobotiqSocket
-    link_down_s: float = 0.0
-    """How long the network shall be down; the server takes it and sets it back."""
+    link_back_s: float = 0.0
+    """When the network is back, by the monotonic clock."""
     stream_frozen: bool = False
     _verbs: dict[str, Callable[[list[float]], None]] = field(default_factory=dict)
 
@@ -34,7 +35,7 @@ class Faults:
             "protective_stop": lambda _: arm.protective_stop("injected"),
             "emergency_stop": lambda _: arm.emergency_stop(),
             "release_emergency_stop": lambda _: arm.release_emergency_stop(),
-            "link_loss": lambda x: setattr(self, "link_down_s", x[0]),
+            "link_loss": lambda x: setattr(self, "link_back_s", time.monotonic() + x[0]),
             "local_mode": lambda _: self._local_mode(),
             "slow": lambda x: setattr(arm, "slowdown", x[0]),
             "stale": lambda _: setattr(self, "stream_frozen", True),
@@ -51,13 +52,24 @@ class Faults:
             "reset": lambda _: self._reset(),
         }
 
+    @property
+    def link_is_down(self) -> bool:
+        """Whether nobody can connect."""
+        return time.monotonic() < self.link_back_s
+
     def answer(self, line: str) -> str:
-        """Do one verb: `ok`, or what is wrong with the line. `log` answers the controller's events."""
+        """Do one verb: `ok`, or what is wrong with the line.
+
+        `log` answers the controller's events, `speed` that of the fastest joint in rad/s.
+        """
         name, *words = line.split() or [""]
+        arm = self.dashboard.program.arm
         if name == "log":
-            return " | ".join(self.dashboard.program.arm.log)
+            return " | ".join(arm.log)
+        if name == "speed":
+            return str(np.abs(arm.joint_speeds).max())
         if name not in self._verbs:
-            return f"unknown fault '{name}': choose one of {', '.join(self._verbs)}, log"
+            return f"unknown fault '{name}': choose one of {', '.join(self._verbs)}, log, speed"
         try:
             self._verbs[name]([float(word) for word in words])
         except (ValueError, IndexError):
@@ -80,7 +92,7 @@ class Faults:
         vars(arm).update(vars(fresh))
         arm.joints = np.array(HOME_RAD)
         vars(self.gripper).update(vars(RobotiqSocket()))
-        self.dashboard.remote, self.stream_frozen = True, False
+        self.dashboard.remote, self.stream_frozen, self.link_back_s = True, False, 0.0
 
 
 def _six(joints_rad: list[float]) -> Array:

@@ -72,14 +72,17 @@ class SimulatedController:
             message = line or f"the simulated controller at {host} ended with code {code} before it was ready"
             raise InputError(message) if code == InputError.exit_code else HecbenchError(message)
 
-    def fault(self, line: str) -> str:
-        """Send one verb of `controller_sim.faults` and return the answer; a wrong one raises `InputError`."""
+    def fault(self, line: str) -> None:
+        """Send one verb of `controller_sim.faults`; a wrong one raises `InputError`."""
+        answer = self.ask(line)
+        if answer != "ok":
+            raise InputError(answer)
+
+    def ask(self, line: str) -> str:
+        """The answer of the fault port to one line, `log` or `speed`."""
         with socket.create_connection((self.host, FAULT_PORT), timeout=_ANSWER_S) as client:
             client.sendall(f"{line}\n".encode())
-            answer = client.makefile().readline().strip()
-        if answer != "ok" and line != "log":
-            raise InputError(answer)
-        return answer
+            return client.makefile().readline().strip()
 
     def _ended(self) -> int:
         """The exit code of a process that is about to end by itself."""

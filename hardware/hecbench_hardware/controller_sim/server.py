@@ -50,7 +50,6 @@ class _Server:
     selector: selectors.BaseSelector = field(default_factory=selectors.DefaultSelector)
     connections: list[_Connection] = field(default_factory=list)
     owners: dict[str, RtdeSession] = field(default_factory=dict)
-    link_back_s: float = 0.0
 
     def __post_init__(self) -> None:
         self.gripper = RobotiqSocket()
@@ -96,7 +95,7 @@ class _Server:
     def accept(self, listener: socket.socket) -> None:
         client, _ = listener.accept()
         port = listener.getsockname()[1]
-        if port != FAULT_PORT and time.monotonic() < self.link_back_s:
+        if port != FAULT_PORT and self.faults.link_is_down:
             client.close()
             return
         client.setblocking(False)
@@ -162,9 +161,7 @@ class _Server:
                 self.send(connection, self.gripper.answer(line))
             else:
                 self.send(connection, f"{self.faults.answer(line)}\n".encode())
-        if self.faults.link_down_s:
-            self.link_back_s = time.monotonic() + self.faults.link_down_s
-            self.faults.link_down_s = 0.0
+        if self.faults.link_is_down:
             for other in [c for c in self.connections if c.port != FAULT_PORT]:
                 self.drop(other)
 

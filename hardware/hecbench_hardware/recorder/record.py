@@ -103,6 +103,7 @@ class Recorder:
                 Fault.LATE, self.robot.name, f"moved {joint_change:.5f} rad during the exposure"
             )
         images = [frame.image for frame in frames]
+        average = _average(images, self.camera.name, self.cell)
         line = _line(sample_id, before)
         line.joints_rad = (0.5 * (before.joints_rad + after.joints_rad)).tolist()
         line.joint_change_rad = joint_change
@@ -111,7 +112,7 @@ class Recorder:
         line.camera_clock_s = frames[-1].camera_stamp_s
         line.frames = [frame.source for frame in frames]
         line.image_change = float(np.abs(images[-1].astype(float) - images[0]).mean())
-        line.image = self._session.save_image(sample_id, _average(images))
+        line.image = self._session.save_image(sample_id, average)
         self._session.append(line)
 
     def _finish(self, ids: list[str]) -> Recording:
@@ -155,9 +156,14 @@ def _line(sample_id: str, state: RobotState) -> SampleLine:
     )
 
 
-def _average(images: list[NDArray[np.uint8]]) -> NDArray[np.uint8]:
-    if any(image.shape != images[0].shape for image in images):
-        raise DeviceFault(Fault.CAMERA, "camera", "the frames have different sizes")
+def _average(images: list[NDArray[np.uint8]], camera: str, cell: Recording) -> NDArray[np.uint8]:
+    sizes = {image.shape[1::-1] for image in images}
+    if len(sizes) > 1:
+        raise DeviceFault(Fault.CAMERA, camera, f"the frames have different sizes {sorted(sizes)}")
+    if cell.camera and sizes != {(cell.camera.width, cell.camera.height)}:
+        raise InputError(
+            f"{camera} gives {sizes.pop()} px, the cell says {cell.camera.width}x{cell.camera.height}: correct one"
+        )
     return np.asarray(np.rint(np.mean(images, axis=0)), np.uint8)
 
 

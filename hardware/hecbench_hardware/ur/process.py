@@ -75,7 +75,7 @@ class Worker:
                 fine, result = self.connection.recv()
             except (EOFError, OSError):
                 self.end()
-                raise WorkerGone(f"{name} had no answer") from None
+                raise WorkerGone(f"{' '.join([name, *map(str, args[:1])])} had no answer") from None
         if not fine:
             raise HecbenchError(str(result))
         return result

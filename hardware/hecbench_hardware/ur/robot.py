@@ -22,13 +22,15 @@ from hecbench_hardware.ur import recovery
 from hecbench_hardware.ur.dashboard import Dashboard, probe
 from hecbench_hardware.ur.outputs import Outputs
 from hecbench_hardware.ur.process import Worker, WorkerGone
-from hecbench_hardware.ur.stream import Sample, StateStream, Supervision
-from hecbench_hardware.ur.worker import STOP_RAD_S2
+from hecbench_hardware.ur.stream import Sample, StateStream, Supervision, fault_of
+from hecbench_hardware.ur.worker import CALL_S, STOP_RAD_S2
 
 POLL_S = 0.001
 STILL_RAD_S = 1e-3
 STILL_FOR_S = 0.3
 _ARRIVED_RAD = 1e-3
+_BRAKE_S = 0.6
+"""Braking from the highest speed, and some."""
 _NEWS_S = 0.2
 """How long to wait for the supervisor to learn why a program ended."""
 
@@ -144,9 +146,9 @@ class UrRobot:
         worker = Worker("control", self.host)
         try:
             worker.ready(raw=False)
-        except WorkerGone as error:
-            raise DeviceFault(Fault.LINK_LOST, self.name, str(error)) from None
-        except HecbenchError as error:
+        except (WorkerGone, HecbenchError) as error:
+            if found := fault_of(self._stream.latest):
+                raise DeviceFault(found[0], self.name, found[1]) from None
             raise recovery.explained(self.name, str(error)) from None
         self._control = worker
         offset = np.array(self._request("call", "getTCPOffset"))
@@ -163,13 +165,16 @@ class UrRobot:
             with suppress(DeviceFault):
                 self._dashboard.ask("stop")
 
-    def _request(self, method: str, *args: object) -> Any:
+    def _request(self, method: str, *args: object, deadline_s: float = CALL_S) -> Any:
         """One request to the control worker; its death becomes the fault that caused it."""
         control = self._control
         if control is None:
             raise self._stream.fault or InputError(f"{self.name} is read-only: add --arm to let it move")
         try:
-            return control.request(method, *args)
+            if self._stream.link_lost:
+                control.end()
+                raise WorkerGone("the state stream is gone")
+            return control.request(method, *args, deadline_s=deadline_s)
         except WorkerGone as error:
             self._control = None
             self._on_fault(Fault.LINK_LOST)
@@ -277,10 +282,11 @@ class UrRobot:
                 moved_s = sample.controller_s
             return sample.controller_s - moved_s >= STILL_FOR_S
 
-        if not self._stream.wait_for(still, timeout_s):
-            raise self._stream.fault or DeviceFault(
-                Fault.LATE, self.name, f"not still after {timeout_s:.1f} s"
-            )
+        rests = self._stream.wait_for(still, timeout_s)
+        if self._stream.fault:
+            raise self._stream.fault
+        if not rests:
+            raise DeviceFault(Fault.LATE, self.name, f"not still after {timeout_s:.1f} s")
         state = self.state()
         if self._target is not None:
             gap_rad = float(np.abs(state.joints_rad - self._target).max())
@@ -294,14 +300,8 @@ class UrRobot:
         self._target = None
         if self._control is None:
             return
-        if self._stream.link_lost:
-            control, self._control = self._control, None
-            if control:
-                control.end()
-            self._on_fault(Fault.LINK_LOST)
-            return
         with suppress(DeviceFault):
-            self._request("call", "stopJ", STOP_RAD_S2)
+            self._request("call", "stopJ", STOP_RAD_S2, deadline_s=_BRAKE_S)
 
     @contextmanager
     def freedrive(self) -> Iterator[None]:
@@ -312,9 +312,12 @@ class UrRobot:
             raise self._why_program_ended()
         try:
             yield
-        finally:
+        except BaseException:
             with suppress(HecbenchError):
                 self._request("call", "endFreedriveMode")
+            raise
+        if not self._request("call", "endFreedriveMode"):
+            raise self._why_program_ended()
 
     # after a fault, and the end
 
@@ -341,7 +344,10 @@ class UrRobot:
         """Stop the arm, end the control script, let go of the controller. May be called twice."""
         control, self._control = self._control, None
         if control:
-            control.leave()
+            if self._stream.link_lost:
+                control.end()
+            else:
+                control.leave()
             if self._slider is not None:
                 with suppress(HecbenchError):
                     self._set_slider(self._slider)

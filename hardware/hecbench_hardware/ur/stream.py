@@ -39,7 +39,7 @@ class Supervision:
     """Of the newest state, by this computer's clock."""
     max_force_n: float = 100.0
     """Norm of the tool force."""
-    late_s: float = 2.0
+    late_s: float = 1.0
     """Past its expected time a motion counts as late."""
 
 

@@ -19,7 +19,7 @@ from typing import Any
 
 CONNECT_S = 5.0
 CALL_S = 1.0
-LEAVE_S = 2.0
+LEAVE_S = 1.0
 WATCHDOG_HZ = 2.0
 """The controller ends the program by itself when it hears nothing for half a second."""
 KICK_S = 0.15
