@@ -253,9 +253,10 @@ def _candidates(
     pairs = list(product(range(len(robot)), range(len(target))))
     gaps = [float(np.sqrt(np.mean((robot_angles[i] - target_angles[j]) ** 2))) for i, j in pairs]
     limit = _CLEARLY_WORSE * min(gaps) + _ANGLE_SLACK_RAD
-    for (i, j), gap in zip(pairs, gaps, strict=True):
-        deviations = robot[i].deviations + target[j].deviations
-        if gap > limit and deviations:
+    departures = [robot[i].deviations + target[j].deviations for i, j in pairs]
+    for (i, j), gap, deviations in zip(pairs, gaps, departures, strict=True):
+        the_documented_one = deviations == 0 and departures.count(0) == 1
+        if gap > limit and not the_documented_one:
             continue
         for mounting in mountings if told else Mounting:
             flange_poses = robot[i].poses

@@ -24,6 +24,7 @@ from hecbench_datasets.reading.sources import (
     Array,
     files_in,
     finite,
+    foreign,
     head,
     image_size,
     item,
@@ -38,6 +39,7 @@ def sniff(path: Path) -> bool:
     return '"cam_K"' in head(path / _CAMERA) and (path / _OBJECTS).is_file()
 
 
+@foreign
 def load(path: Path) -> Recording:
     """Read the images that have a camera pose and show the most frequent object."""
     cameras, objects = json_value(path / _CAMERA), json_value(path / _OBJECTS)

@@ -17,7 +17,7 @@ from hecbench.errors import InputError
 from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
 from hecbench.registry import hookimpl
 from hecbench.specs import DatasetSpec
-from hecbench_datasets.reading.sources import Array, finite, head, text
+from hecbench_datasets.reading.sources import Array, finite, foreign, head, text
 
 _LINE = re.compile(
     r"^(?P<image>\S+\.(?:png|jpg)) (?P<width>\d+)x(?P<height>\d+):"
@@ -32,6 +32,7 @@ def sniff(path: Path) -> bool:
     return any((path / match["image"]).is_file() for match in _LINE.finditer(head(path / "README.md", 20000)))
 
 
+@foreign
 def load(path: Path) -> Recording:
     """Read the first picture that is there."""
     readme = path / "README.md"

@@ -21,7 +21,16 @@ from hecbench.registry import hookimpl
 from hecbench.specs import DatasetSpec
 from hecbench_datasets.reading.hints import hints_for
 from hecbench_datasets.reading.pairing import Documented, paired
-from hecbench_datasets.reading.sources import YAML_SUFFIXES, Array, files_in, finite, head, item, yaml_value
+from hecbench_datasets.reading.sources import (
+    YAML_SUFFIXES,
+    Array,
+    files_in,
+    finite,
+    foreign,
+    head,
+    item,
+    yaml_value,
+)
 
 _SUFFIXES = (*YAML_SUFFIXES, ".samples", ".calib")
 _TRACKING = ("tracking", "optical", "opt")
@@ -43,6 +52,7 @@ def sniff(path: Path) -> bool:
     return _file(path) is not None
 
 
+@foreign
 def load(path: Path) -> Recording:
     """Read the samples, and the calibration file beside them."""
     file = _file(path)

@@ -13,6 +13,7 @@ from hecbench.specs import DatasetSpec
 from hecbench_datasets.reading.sources import (
     files_in,
     finite,
+    foreign,
     image_size,
     natural,
     picture,
@@ -42,6 +43,7 @@ def sniff(path: Path) -> bool:
     return _layout(path) is not None
 
 
+@foreign
 def load(path: Path) -> Recording:
     """Read joints, intrinsics and pictures; those of an archive are decoded here, those of a folder later."""
     layout = _layout(path)

@@ -17,7 +17,7 @@ from hecbench.registry import hookimpl
 from hecbench.specs import DatasetSpec
 from hecbench_datasets.reading.hints import hints_for
 from hecbench_datasets.reading.pairing import Documented, paired
-from hecbench_datasets.reading.sources import finite, head, item, json_value, natural
+from hecbench_datasets.reading.sources import finite, foreign, head, item, json_value, natural
 
 
 def _samples(path: Path) -> list[Path]:
@@ -33,6 +33,7 @@ def sniff(path: Path) -> bool:
     return bool(found) and '"O_T_EE"' in head(found[0])
 
 
+@foreign
 def load(path: Path) -> Recording:
     """Read every sample whose board was detected."""
     joints, robot, target, ids = [], [], [], []

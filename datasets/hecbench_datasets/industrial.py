@@ -19,7 +19,7 @@ from hecbench.registry import hookimpl
 from hecbench.specs import DatasetSpec
 from hecbench.targets import Target
 from hecbench_datasets.reading.hints import circle_grid, hinted_target, hints_for
-from hecbench_datasets.reading.sources import Array, finite, head, image_size, item, yaml_value
+from hecbench_datasets.reading.sources import Array, finite, foreign, head, image_size, item, yaml_value
 
 _NAMES = ("cal_data.yaml", "data.yaml")
 _QUATERNION = ("x", "y", "z", "qx", "qy", "qz", "qw")
@@ -35,6 +35,7 @@ def sniff(path: Path) -> bool:
     return _file(path) is not None
 
 
+@foreign
 def load(path: Path) -> Recording:
     """Read poses, camera and target; the images are for the detector."""
     file = _file(path)

@@ -16,7 +16,7 @@ from hecbench.errors import InputError
 from hecbench.recording import Mounting, Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import DatasetSpec
-from hecbench_datasets.reading.sources import finite, head, item, yaml_value
+from hecbench_datasets.reading.sources import finite, foreign, head, item, yaml_value
 
 
 def _file(path: Path) -> Path | None:
@@ -29,6 +29,7 @@ def sniff(path: Path) -> bool:
     return _file(path) is not None
 
 
+@foreign
 def load(path: Path) -> Recording:
     """Read joints and target poses."""
     file = _file(path)

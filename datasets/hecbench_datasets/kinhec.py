@@ -18,7 +18,7 @@ from hecbench.errors import InputError
 from hecbench.recording import Mounting, Recording, RobotDescription
 from hecbench.registry import hookimpl
 from hecbench.specs import DatasetSpec
-from hecbench_datasets.reading.sources import Array
+from hecbench_datasets.reading.sources import Array, foreign
 from hecbench_datasets.reading.streams import interpolate
 
 INDEX = "sequences.parquet"
@@ -30,6 +30,7 @@ def sniff(path: Path) -> bool:
     return (path / INDEX).is_file() or (not path.exists() and (path.parent / INDEX).is_file())
 
 
+@foreign
 def load(path: Path) -> Recording:
     """Read one sequence."""
     if (path / INDEX).is_file():

@@ -16,7 +16,7 @@ from hecbench.registry import hookimpl
 from hecbench.specs import DatasetSpec
 from hecbench_datasets.reading.hints import hints_for
 from hecbench_datasets.reading.pairing import Documented, paired
-from hecbench_datasets.reading.sources import YAML_SUFFIXES, files_in, finite, head, item, yaml_value
+from hecbench_datasets.reading.sources import YAML_SUFFIXES, files_in, finite, foreign, head, item, yaml_value
 
 _SUFFIXES = (*YAML_SUFFIXES, ".json")
 _ROBOT, _TARGET = "effector_wrt_world", "object_wrt_sensor"
@@ -32,6 +32,7 @@ def sniff(path: Path) -> bool:
     return _file(path) is not None
 
 
+@foreign
 def load(path: Path) -> Recording:
     """Read the samples, and the joint states beside them."""
     file = _file(path)

@@ -16,7 +16,15 @@ from hecbench.registry import hookimpl
 from hecbench.specs import DatasetSpec
 from hecbench_datasets.reading.hints import hints_for
 from hecbench_datasets.reading.pairing import Documented, paired
-from hecbench_datasets.reading.sources import YAML_SUFFIXES, Array, files_in, finite, head, yaml_value
+from hecbench_datasets.reading.sources import (
+    YAML_SUFFIXES,
+    Array,
+    files_in,
+    finite,
+    foreign,
+    head,
+    yaml_value,
+)
 
 _ROBOT = re.compile(r"T1|robot|gripper|flange|hand|tool|ee\b|base", re.IGNORECASE)
 _TARGET = re.compile(r"T2|target|cam|marker|board|tag|eye", re.IGNORECASE)
@@ -34,6 +42,7 @@ def _file(path: Path) -> Path | None:
     return next((file for file in files if _FIRST.search(head(file))), None)
 
 
+@foreign
 def load(path: Path) -> Recording:
     """Read the pairs."""
     file = _file(path)

@@ -18,7 +18,7 @@ from hecbench.registry import hookimpl
 from hecbench.specs import DatasetSpec
 from hecbench_datasets.reading.hints import hinted_target, hints_for
 from hecbench_datasets.reading.pairing import Documented, paired
-from hecbench_datasets.reading.sources import IMAGE_SUFFIXES, Array, files_in, head, table, text
+from hecbench_datasets.reading.sources import IMAGE_SUFFIXES, Array, files_in, foreign, head, table, text
 
 _ROBOT = re.compile(r"robot|flange|gripper|hand|effector|tool|base_T|tcp|\bposes?$", re.IGNORECASE)
 _TARGET = re.compile(r"cam|target|marker|tag|board|tracking", re.IGNORECASE)
@@ -51,6 +51,7 @@ def sniff(path: Path) -> bool:
     return robot is not None and (target is not None or bool(files_in(path, *IMAGE_SUFFIXES)))
 
 
+@foreign
 def load(path: Path) -> Recording:
     """Read the tables."""
     robot_file, target_file = _files(path)

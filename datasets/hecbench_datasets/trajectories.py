@@ -20,7 +20,16 @@ from hecbench.registry import hookimpl
 from hecbench.specs import DatasetSpec
 from hecbench_datasets.reading.hints import hints_for
 from hecbench_datasets.reading.pairing import Documented, paired
-from hecbench_datasets.reading.sources import Array, files_in, head, table, text, zip_bytes, zip_names
+from hecbench_datasets.reading.sources import (
+    Array,
+    files_in,
+    foreign,
+    head,
+    table,
+    text,
+    zip_bytes,
+    zip_names,
+)
 from hecbench_datasets.reading.streams import interpolate, time_offset_s
 
 MOST_SAMPLES = 160
@@ -76,6 +85,7 @@ def sniff(path: Path) -> bool:
     return True
 
 
+@foreign
 def load(path: Path) -> Recording:
     """Read both streams, align the clocks, pair by interpolation."""
     found = _streams(path)

@@ -25,6 +25,7 @@ from hecbench_datasets.reading.sources import (
     Array,
     files_in,
     finite,
+    foreign,
     item,
     text,
     yaml_value,
@@ -43,6 +44,7 @@ def sniff(path: Path) -> bool:
     return bool(_pose_files(path))
 
 
+@foreign
 def load(path: Path) -> Recording:
     """Read poses and camera; the images are for the detector."""
     poses = _pose_files(path)

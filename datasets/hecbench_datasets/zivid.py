@@ -26,6 +26,7 @@ from hecbench_datasets.reading.sources import (
     Array,
     files_in,
     finite,
+    foreign,
     yaml_value,
 )
 
@@ -44,6 +45,7 @@ def sniff(path: Path) -> bool:
     return bool(_numbered(path, _ROBOT, *YAML_SUFFIXES))
 
 
+@foreign
 def load(path: Path) -> Recording:
     """Read robot poses, and the board's poses or the pictures."""
     robot = _numbered(path, _ROBOT, *YAML_SUFFIXES)

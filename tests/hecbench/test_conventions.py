@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from hecbench import se3
-from hecbench.conventions import EULER_ORDERS, prove, readings, stillness
+from hecbench.conventions import prove, readings, stillness
 from hecbench.errors import InputError
 from hecbench.recording import Mounting
 
@@ -53,8 +53,8 @@ def test_a_swapped_quaternion_order_is_named(poses):
     assert "documented reading does not" in proof.note
 
 
-@pytest.mark.parametrize("order", [*EULER_ORDERS, *(order.lower() for order in EULER_ORDERS)])
-def test_each_euler_order_in_degrees_and_millimetres_is_found(poses, order):
+@pytest.mark.parametrize("order", ["XYZ", "ZYX", "ZYZ", "YXZ", "xyz", "zyx", "zxz", "yxy"])
+def test_the_euler_order_in_degrees_and_millimetres_is_found(poses, order):
     mounting, robot, target = poses
     angles = Rotation.from_matrix(robot[:, :3, :3]).as_euler(order, degrees=True)
     rows = np.hstack([1e3 * robot[:, :3, 3], angles])

@@ -6,6 +6,8 @@ import csv
 import io
 import re
 import zipfile
+from collections.abc import Callable
+from functools import wraps
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +17,36 @@ from numpy.typing import ArrayLike, NDArray
 
 from hecbench import files
 from hecbench.errors import InputError
+from hecbench.recording import Recording
 
 Array = NDArray[np.float64]
 
 YAML_SUFFIXES = (".yaml", ".yml")
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
+
+
+def foreign(load: Callable[[Path], Recording]) -> Callable[[Path], Recording]:
+    """A loader whose every complaint is an `InputError` that names the path.
+
+    Other people's files may hold anything anywhere; what a loader does not look for, such as a number in
+    place of a list, is said as it was met.
+    """
+
+    @wraps(load)
+    def guarded(path: Path) -> Recording:
+        try:
+            return load(path)
+        except InputError as error:
+            if str(path) in str(error):
+                raise
+            raise InputError(f"{path}: {error}") from error
+        except (AttributeError, LookupError, TypeError, ValueError, OverflowError) as error:
+            raise InputError(
+                f"{path}: is not laid out as its format is ({type(error).__name__}: {error}); "
+                "see docs/adapters.md"
+            ) from error
+
+    return guarded
 
 
 def head(path: Path, count: int = 4096) -> str:
