@@ -88,7 +88,8 @@ class _Trial:
     def connect(self) -> UrRobot:
         supervision = Supervision(max_age_s=0.4, late_s=0.7)
         self.robot = UrRobot(self.controller.host, ARMS["ur5e"], supervision=supervision)
-        return self.robot.enable()
+        self.robot.enable()
+        return self.robot
 
     def recorder(self, robot: UrRobot) -> Recorder:
         joints = _READY + 0.1 * np.eye(6)[:3]

@@ -18,6 +18,8 @@ from numpy.typing import NDArray
 from hecbench.errors import HecbenchError
 from hecbench.recording import CameraModel
 from hecbench.se3 import Array
+from hecbench_hardware.kinematics import UrArm
+from hecbench_hardware.limits import Limits
 
 
 class Fault(StrEnum):
@@ -96,6 +98,17 @@ class Robot(Protocol):
 
     name: str
     simulated: bool
+    arm: UrArm
+    limits: Limits
+
+    @property
+    def enabled(self) -> bool:
+        """Whether it can be moved from here, or only read."""
+        ...
+
+    def enable(self) -> None:
+        """Take control. Only `arming.take_control` calls this, so that nothing moves unasked."""
+        ...
 
     def state(self) -> RobotState:
         """The newest state; raises `DeviceFault` when there is none fresh enough."""

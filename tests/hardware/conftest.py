@@ -39,7 +39,9 @@ def connect(controller):
 
 @pytest.fixture
 def robot(connect):
-    return connect().enable()
+    enabled = connect()
+    enabled.enable()
+    return enabled
 
 
 @pytest.fixture

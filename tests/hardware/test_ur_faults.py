@@ -39,7 +39,8 @@ def moved_into(robot, act):
     ],
 )
 def test_fault_in_motion_is_named_and_recovered_from(connect, controller, ready_pose, verb, fault):
-    robot = connect(supervision=Supervision(max_age_s=0.5, late_s=1.0, max_force_n=100)).enable()
+    robot = connect(supervision=Supervision(max_age_s=0.5, late_s=1.0, max_force_n=100))
+    robot.enable()
     seen = moved_into(robot, lambda: controller.fault(verb))
     assert seen is fault or (verb.startswith("contact") and seen is Fault.FORCE)
     if fault is not Fault.PROTECTIVE_STOP:

@@ -10,10 +10,10 @@ import time
 import numpy as np
 import psutil
 import pytest
+from hecbench_hardware.arming import take_control
 from hecbench_hardware.devices import DeviceFault, Fault
 from hecbench_hardware.kinematics import ARMS
 from hecbench_hardware.limits import Box, Limits
-from hecbench_hardware.robots import universal_robots
 from hecbench_hardware.ur.dashboard import Dashboard
 from hecbench_hardware.ur.outputs import Outputs
 from hecbench_hardware.ur.robot import UrRobot
@@ -67,7 +67,8 @@ def test_motions_arrive(robot, ready_pose):
 
 
 def test_the_tool_offset_of_the_controller_is_respected(connect, controller, ready_pose):
-    robot = connect().enable()
+    robot = connect()
+    robot.enable()
     robot._request("call", "setTcp", [0, 0, 0.15, 0.1, 0, 0])
     assert robot.recover(lambda line: True)
     assert robot.flange_T_tcp[:3, 3] == pytest.approx([0, 0, 0.15])
@@ -113,7 +114,8 @@ def test_bad_linear_targets_are_refused(robot):
 
 def test_a_path_through_a_forbidden_box_is_refused(connect, ready_pose):
     box = Box((-0.6, -0.6, 0.0), (-0.3, -0.4, 1.0))
-    robot = connect(limits=Limits(keep_out=(box,))).enable()
+    robot = connect(limits=Limits(keep_out=(box,)))
+    robot.enable()
     with pytest.raises(InputError, match="keep-out box"):
         robot.move_joints([1.0, *robot.state().joints_rad[1:]])
 
@@ -168,8 +170,8 @@ def test_settle_says_when_the_arm_is_not_where_it_was_sent(robot, controller, re
 
 
 def test_speed_slider_is_set_and_set_back(connect, controller, ready_pose):
-    watcher, robot = connect(), connect()
-    robot.enable(speed_slider=0.4)
+    watcher, robot = connect(), connect(speed_slider=0.4)
+    robot.enable()
     wait_until(lambda: watcher.state().speed_fraction == pytest.approx(0.4))
     robot.move_joints(ready_pose)
     robot.close()
@@ -218,27 +220,51 @@ def test_wrong_address_and_wrong_model(controller):
         UrRobot(controller.host, ARMS["ur10e"])
 
 
-def test_a_real_robot_is_enabled_only_when_armed(controller, monkeypatch):
+def spec(name):
+    return load().get(Kind.ROBOT, name, DeviceSpec)
+
+
+def test_a_real_robot_is_taken_control_of_only_when_armed_and_confirmed(controller, monkeypatch):
     monkeypatch.setattr(Dashboard, "is_simulated", lambda self: False)
-    options = {"host": controller.host, "max_age_s": "1.0"}
-    robot = universal_robots.open_arm(ARMS["ur5e"], options)
+    robot = spec("ur5e").open({"host": controller.host, "max_age_s": "1.0"})
+    asked = []
     try:
+        with pytest.raises(InputError, match="--arm"):
+            take_control(robot, "3 motions", armed=False, confirm=lambda line: not asked.append(line))
+        with pytest.raises(InputError, match="not confirmed"):
+            take_control(robot, "3 motions", armed=True, confirm=lambda line: False)
+        assert not asked
         assert not robot.enabled
+        take_control(robot, "3 motions", armed=True, confirm=lambda line: not asked.append(line))
+        assert robot.enabled
+        assert "3 motions" in asked[0]
     finally:
         robot.close()
-    armed = universal_robots.open_arm(ARMS["ur5e"], {**options, "arm": "yes"})
+
+
+def test_a_simulated_robot_needs_no_arming(controller):
+    robot = spec("ur5e").open({"host": controller.host, "max_age_s": "1.0"})
     try:
-        assert armed.enabled
+        take_control(robot, "1 motion", armed=False, confirm=lambda line: False)
+        assert robot.enabled
     finally:
-        armed.close()
-    with pytest.raises(InputError, match="arm=perhaps"):
-        universal_robots.open_arm(ARMS["ur5e"], {**options, "arm": "perhaps"})
+        robot.close()
+
+
+@pytest.mark.parametrize(
+    ("options", "complaint"),
+    [({"speed_slider": "2"}, "speed_slider"), ({"max_age_s": "nan"}, "finite"), ({}, "host")],
+)
+def test_bad_options(controller, options, complaint):
+    host = {"host": controller.host} if options else {}
+    with pytest.raises(InputError, match=complaint):
+        spec("ur5e").open({**host, **options})
 
 
 def test_simulated_arm_by_name_brings_its_controller(ready_pose):
-    spec = load().get(Kind.ROBOT, "sim_ur5e", DeviceSpec)
-    robot = spec.open({"time_scale": "50", "max_age_s": "1.0"})
+    robot = spec("sim_ur5e").open({"time_scale": "50", "max_age_s": "1.0"})
     try:
+        robot.enable()
         robot.move_joints(ready_pose)
         host = robot.host
     finally:
@@ -253,7 +279,8 @@ import numpy as np
 from hecbench_hardware.kinematics import ARMS
 from hecbench_hardware.ur.robot import UrRobot
 from hecbench_hardware.ur.stream import Supervision
-robot = UrRobot(sys.argv[1], ARMS["ur5e"], supervision=Supervision(max_age_s=1.0)).enable()
+robot = UrRobot(sys.argv[1], ARMS["ur5e"], supervision=Supervision(max_age_s=1.0))
+robot.enable()
 print("moving", flush=True)
 robot.move_joints(robot.state().joints_rad + [1, 0, 0, 0, 0, 0], speed_rad_s=0.01)
 """

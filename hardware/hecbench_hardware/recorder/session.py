@@ -19,6 +19,8 @@ from hecbench.errors import HecbenchError, InputError
 from hecbench.recording_io import encode_png
 
 FILE_NAME = "session.jsonl"
+PLAN_NAME = "plan.json"
+"""The checked plan, which may be there before the recording."""
 IMAGES = "images"
 
 
@@ -66,7 +68,7 @@ class Session:
         if self._path.exists():
             self._resume(plan_digest)
             return
-        if folder.exists() and any(folder.iterdir()):
+        if folder.exists() and {path.name for path in folder.iterdir()} - {PLAN_NAME}:
             raise InputError(f"{folder} is not empty and has no {FILE_NAME}: choose another --out")
         try:
             (folder / IMAGES).mkdir(parents=True, exist_ok=True)

@@ -7,10 +7,11 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from hecbench.errors import InputError
 from hecbench.registry import hookimpl
 from hecbench.specs import DeviceSpec, Kind
 from hecbench_hardware.kinematics import ARMS, UrArm
-from hecbench_hardware.options import flag, number, text
+from hecbench_hardware.options import number, text
 
 _COMMON = ("limits", "speed_slider", "max_age_s", "max_force_n")
 
@@ -24,26 +25,18 @@ def _settings(options: Mapping[str, str]) -> dict[str, Any]:
         max_age_s=number(options, "max_age_s", usual.max_age_s),
         max_force_n=number(options, "max_force_n", usual.max_force_n),
     )
+    slider = number(options, "speed_slider", 1.0) if "speed_slider" in options else None
+    if slider is not None and not 0 < slider <= 1:
+        raise InputError(f"speed_slider={slider} is not above 0 and at most 1")
     limits = load_limits(Path(options["limits"])) if "limits" in options else Limits()
-    return {"limits": limits, "supervision": supervision}
-
-
-def _slider(options: Mapping[str, str]) -> float | None:
-    return number(options, "speed_slider", 1.0) if "speed_slider" in options else None
+    return {"limits": limits, "supervision": supervision, "speed_slider": slider}
 
 
 def open_arm(arm: UrArm, options: Mapping[str, str]) -> Any:
-    """Connect to a controller. It is taken control of only with ``arm=yes``, or when it is simulated."""
+    """Connect to a controller, read-only."""
     from hecbench_hardware.ur.robot import UrRobot
 
-    robot = UrRobot(text(options, "host"), arm, **_settings(options))
-    try:
-        if robot.simulated or flag(options, "arm"):
-            robot.enable(_slider(options))
-    except BaseException:
-        robot.close()
-        raise
-    return robot
+    return UrRobot(text(options, "host"), arm, **_settings(options))
 
 
 def open_simulated(arm: UrArm, options: Mapping[str, str]) -> Any:
@@ -60,14 +53,9 @@ def open_simulated(arm: UrArm, options: Mapping[str, str]) -> Any:
         options.get("host"), model=arm.name, time_scale=number(options, "time_scale", 1.0)
     ).start()
     try:
-        robot = WithController(controller.host, arm, **_settings(options))
+        return WithController(controller.host, arm, **_settings(options))
     except BaseException:
         controller.stop()
-        raise
-    try:
-        return robot.enable(_slider(options))
-    except BaseException:
-        robot.close()
         raise
 
 
@@ -82,7 +70,7 @@ def hecbench_robots() -> Iterable[DeviceSpec]:
             imports=("rtde_control", "rtde_receive"),
             open=partial(open_arm, arm),
             simulated=False,
-            options=("host", "arm", *_COMMON),
+            options=("host", *_COMMON),
         )
         yield DeviceSpec(
             name=f"sim_{arm.name}",

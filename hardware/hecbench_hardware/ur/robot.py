@@ -45,8 +45,16 @@ class UrRobot:
         *,
         limits: Limits | None = None,
         supervision: Supervision | None = None,
+        speed_slider: float | None = None,
     ) -> None:
         """Connect to the state stream.
+
+        Args:
+            host: Address of the controller.
+            arm: The model that it drives.
+            limits: Bounds of every motion.
+            supervision: When the supervisor stops the arm.
+            speed_slider: `enable` sets the slider to this fraction and `close` sets it back.
 
         Raises:
             DeviceFault: Nothing answers there.
@@ -62,7 +70,8 @@ class UrRobot:
         self.simulated = self._dashboard.is_simulated()
         self._refuse_other_model()
         self._control: Worker | None = None
-        self._slider: float | None = None
+        self._speed_slider = speed_slider
+        self._slider_before: float | None = None
         self._target: Array | None = None
         self._stopping = threading.Event()
         self._motion = threading.Lock()
@@ -125,22 +134,18 @@ class UrRobot:
         """Whether the arm can be moved from here."""
         return self._control is not None
 
-    def enable(self, speed_slider: float | None = None) -> Self:
+    def enable(self) -> None:
         """Take control: upload the control script, read the tool offset, start to supervise.
-
-        Args:
-            speed_slider: Set the slider to this fraction; `close` sets it back.
 
         Raises:
             DeviceFault: Local mode, another program or client, a safety stop, power off.
         """
         sample = self._stream.latest
         recovery.refuse_unready(self.name, self._dashboard, sample)
-        self._slider = None if speed_slider is None else sample.speed_fraction
         self._take_control()
-        if speed_slider is not None:
-            self._set_slider(speed_slider)
-        return self
+        if self._speed_slider is not None:
+            self._set_slider(self._speed_slider)
+            self._slider_before = sample.speed_fraction
 
     def _take_control(self) -> None:
         worker = Worker("control", self.host)
@@ -348,9 +353,9 @@ class UrRobot:
                 control.end()
             else:
                 control.leave()
-            if self._slider is not None:
+            if self._slider_before is not None:
                 with suppress(HecbenchError):
-                    self._set_slider(self._slider)
+                    self._set_slider(self._slider_before)
         self._stream.close()
 
     def __enter__(self) -> Self:

@@ -1,0 +1,192 @@
+"""The verbs of devices: ``hecbench controller`` and ``hecbench record``."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from contextlib import ExitStack
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from hecbench.errors import InputError
+
+if TYPE_CHECKING:
+    from hecbench.recording import Recording
+    from hecbench.specs import Kind
+    from hecbench_hardware.devices import Robot
+
+_folder = click.Path(path_type=Path, file_okay=False)
+_file = click.Path(path_type=Path, dir_okay=False)
+
+
+@click.command()
+@click.option("--host", default="127.0.0.2", show_default=True, help="A loopback address; one per arm.")
+@click.option("--model", default="ur5e", show_default=True, help="ur3e, ur5e or ur10e.")
+@click.option("--time-scale", type=float, default=1.0, show_default=True, help="Its seconds per real second.")
+def controller(host: str, model: str, time_scale: float) -> None:
+    """Be a simulated UR controller until interrupted; prints `ready HOST` when it listens."""
+    from hecbench_hardware.controller_sim.server import serve
+
+    serve(host, model=model, time_scale=time_scale, announce=click.echo)
+
+
+@click.command()
+@click.argument("cell", type=click.Path(path_type=Path))
+@click.option(
+    "--out", type=_folder, required=True, help="Folder of the recording; an unfinished one goes on."
+)
+@click.option("--robot", default="sim_ur5e", show_default=True)
+@click.option("--host", help="Address of the controller.")
+@click.option("--arm", is_flag=True, help="Let a robot that is not simulated move, after a question.")
+@click.option("--limits", type=_file, help="JSON file of limits; see docs/hardware-safety.md.")
+@click.option("--camera", default="none", show_default=True, help="none records poses only.")
+@click.option(
+    "--set", "settings", multiple=True, metavar="DEVICE.NAME=VALUE", help="E.g. camera.folder=images."
+)
+@click.option(
+    "--poses", type=click.IntRange(min=3), help="Plan this many diverse poses around the first sample."
+)
+@click.option("--freedrive", is_flag=True, help="Guide the arm by hand instead of driving a plan.")
+@click.option(
+    "--frames", type=click.IntRange(min=1), default=1, show_default=True, help="Averaged per sample."
+)
+@click.option("--dry-run", is_flag=True, help="Check the plan and drive it on a simulated controller only.")
+@click.option("--yes", is_flag=True, help="Answer every question with yes.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else.")
+def record(
+    cell: Path,
+    out: Path,
+    robot: str,
+    host: str | None,
+    arm: bool,
+    limits: Path | None,
+    camera: str,
+    settings: tuple[str, ...],
+    poses: int | None,
+    freedrive: bool,
+    frames: int,
+    dry_run: bool,
+    yes: bool,
+    seed: int,
+    as_json: bool,
+) -> None:
+    """Record the poses of CELL, a recording folder whose samples have joints, with a robot and a camera.
+
+    CELL describes camera, target and mounting. Its samples are the plan, or with --poses the first one is the
+    start of a planned one, or with --freedrive they are not used. The checked plan is written to OUT/plan.json.
+    """
+    from hecbench import recording_io
+    from hecbench.specs import Kind
+    from hecbench_hardware.arming import take_control
+    from hecbench_hardware.recorder.record import Recorder
+
+    plan = recording_io.load(cell)
+    given = _settings(settings)
+    extra = {"host": host, "limits": None if limits is None else str(limits)}
+    with ExitStack() as open_devices:
+        eye = None
+        if camera != "none" and not dry_run:
+            eye = _open(Kind.CAMERA, camera, given["camera"])
+            open_devices.callback(eye.close)
+        device = _open(Kind.ROBOT, robot, given["robot"] | {k: v for k, v in extra.items() if v is not None})
+        open_devices.callback(device.close)
+        what = "guided by hand"
+        if not freedrive:
+            plan, what = _checked(plan, device, out, poses, seed, dry_run)
+            click.echo(f"{out}/plan.json: {what}", err=True)
+            if dry_run:
+                return
+        take_control(device, what, armed=arm, confirm=lambda line: yes or click.confirm(line, err=True))
+        recorder = Recorder(
+            device,
+            eye,
+            plan,
+            out,
+            frames=frames,
+            acknowledge=lambda line: _acknowledged(line, yes or device.simulated),
+            report=lambda line: click.echo(line, err=True),
+        )
+        recording = recorder.follow_hand(_more) if freedrive else recorder.drive()
+    _print(recording, out, as_json)
+
+
+def _settings(pairs: tuple[str, ...]) -> dict[str, dict[str, str]]:
+    """Options by device from ``robot.x=1``, ``camera.y=2``."""
+    found: dict[str, dict[str, str]] = {"robot": {}, "camera": {}}
+    for pair in pairs:
+        key, separator, value = pair.partition("=")
+        device, dot, name = key.partition(".")
+        if not separator or not dot or device not in found:
+            raise InputError(f"--set {pair}: write robot.NAME=VALUE or camera.NAME=VALUE")
+        found[device][name] = value
+    return found
+
+
+def _open(kind: Kind, name: str, options: Mapping[str, str]) -> Any:
+    from hecbench import registry
+    from hecbench.specs import DeviceSpec
+
+    spec = registry.load().get(kind, name, DeviceSpec)
+    for option in options:
+        if option not in spec.options:
+            raise InputError(f"{kind} '{name}' has no option {option}: it takes {', '.join(spec.options)}")
+    return spec.open(options)
+
+
+def _checked(
+    cell: Recording, robot: Robot, out: Path, poses: int | None, seed: int, dry_run: bool
+) -> tuple[Recording, str]:
+    """The plan, checked from where the arm stands, and what it amounts to in words."""
+    import numpy as np
+
+    from hecbench_hardware.recorder import plan as planning
+    from hecbench_hardware.recorder.poses import diverse_plan
+    from hecbench_hardware.recorder.session import PLAN_NAME
+
+    if cell.robot and cell.robot.model not in (None, robot.arm.name):
+        raise InputError(
+            f"{cell.name} was made for a {cell.robot.model}, not a {robot.arm.name}: choose --robot"
+        )
+    if poses is not None:
+        cell = diverse_plan(cell, robot.arm, robot.limits, poses, np.random.default_rng(seed))
+    check = planning.dry_run if dry_run else planning.check_plan
+    steps = check(robot.arm, cell, robot.state().joints_rad, robot.limits)
+    planning.write_plan(steps, out / PLAN_NAME)
+    return cell, f"{len(steps)} motions, about {sum(step.expected_s for step in steps):.0f} s"
+
+
+def _acknowledged(line: str, at_once: bool) -> bool:
+    click.echo(line, err=True)
+    return at_once or (sys.stdin.isatty() and click.confirm("Make the arm ready and go on?", err=True))
+
+
+def _more(count: int) -> bool:
+    answer = click.prompt(f"{count} samples; Enter records, q ends", default="", show_default=False, err=True)
+    return str(answer).strip().lower() != "q"
+
+
+def _print(recording: Recording, out: Path, as_json: bool) -> None:
+    """What was recorded and what `check` says; exits with 3 on a critical finding."""
+    import msgspec
+
+    from hecbench.diagnose import Severity, check
+    from hecbench.runner import prepare
+
+    findings = check(recording, prepare)
+    if as_json:
+        answer = {
+            "recording": str(out),
+            "samples": len(recording),
+            "findings": [finding.to_json() for finding in findings],
+        }
+        click.echo(msgspec.json.format(msgspec.json.encode(answer), indent=1))
+    else:
+        click.echo(f"{out}: {len(recording)} samples")
+        for finding in findings:
+            if finding.severity is not Severity.OK:
+                click.echo(f"{finding.severity}: {finding.summary} {finding.action}".rstrip())
+    if any(finding.severity is Severity.CRITICAL for finding in findings):
+        sys.exit(3)

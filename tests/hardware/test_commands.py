@@ -1,0 +1,119 @@
+"""The verbs: a recording by one command, and every wrong word in one line."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from hecbench_hardware.commands import controller as controller_verb
+from hecbench_hardware.commands import record
+from hecbench_hardware.kinematics import ARMS
+from PIL import Image
+
+from hecbench import recording_io, se3
+from hecbench.errors import InputError
+from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
+from hecbench.targets import AprilTagTarget
+
+FAST = ("--set", "robot.time_scale=50", "--set", "robot.max_age_s=1")
+
+
+@pytest.fixture
+def cell(tmp_path, ready_pose):
+    folder = tmp_path / "cell"
+    description = Recording(
+        name="cell",
+        mounting=Mounting.EYE_IN_HAND,
+        sample_ids=("0", "1"),
+        robot=RobotDescription(model="ur5e"),
+        camera=CameraModel(64, 48, np.array([[60.0, 0, 32], [0, 60, 24], [0, 0, 1]])),
+        target=AprilTagTarget("tag36h11", 0, 0.1),
+        initial_parent_T_camera=se3.make(np.eye(3), [0, 0.06, 0.04]),
+        joints_rad=ready_pose + 0.1 * np.eye(6)[:2],
+        base_T_flange=ARMS["ur5e"].forward(ready_pose + 0.1 * np.eye(6)[:2]),
+        camera_T_target=np.stack([se3.make(np.eye(3), [0, 0, 0.5])] * 2),
+    )
+    recording_io.save(description, folder)
+    return folder
+
+
+@pytest.fixture
+def invoke():
+    def run(*words, **settings):
+        return CliRunner().invoke(record, [str(word) for word in words], catch_exceptions=False, **settings)
+
+    return run
+
+
+def test_record_a_plan_with_images(invoke, cell, tmp_path):
+    pictures = tmp_path / "pictures"
+    pictures.mkdir()
+    for k in range(2):
+        Image.fromarray(np.full((48, 64, 3), 100 * k, np.uint8)).save(pictures / f"{k}.png")
+    out = tmp_path / "out"
+    camera = ("--camera", "images", "--set", f"camera.folder={pictures}")
+    result = invoke(cell, "--out", out, *FAST, *camera, "--json")
+    answer = json.loads(result.stdout)
+    assert answer["samples"] == 2
+    assert {finding["id"] for finding in answer["findings"]}
+    assert result.exit_code in (0, 3)
+    assert len(recording_io.load(out)) == 2
+    assert json.loads((out / "plan.json").read_text())["motions"] == 2
+
+
+def test_dry_run_writes_the_plan_and_nothing_else(invoke, cell, tmp_path):
+    out = tmp_path / "out"
+    result = invoke(cell, "--out", out, *FAST, "--poses", 4, "--dry-run")
+    assert result.exit_code == 0
+    assert result.stdout == ""
+    steps = json.loads((out / "plan.json").read_text())["steps"]
+    assert len(steps) == 4
+    assert max(step["reached_error_rad"] for step in steps) < 1e-9
+    assert [path.name for path in out.iterdir()] == ["plan.json"]
+
+
+def test_freedrive_on_a_simulated_arm(invoke, cell, tmp_path):
+    result = invoke(cell, "--out", tmp_path / "out", *FAST, "--freedrive", input="\nq\n")
+    assert "1 samples" in result.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (("--robot", "r2d2"), "no robot is called 'r2d2'"),
+        (("--camera", "eye"), "no camera is called 'eye'"),
+        (("--set", "gain=3"), "camera.NAME=VALUE"),
+        (("--set", "robot.colour=red"), "no option colour"),
+        (("--robot", "sim_ur10e"), "was made for a ur5e"),
+        (("--robot", "ur5e"), "host="),
+    ],
+)
+def test_wrong_words_are_one_line(invoke, cell, tmp_path, words, complaint):
+    fast = () if words == ("--robot", "ur5e") else FAST
+    with pytest.raises(InputError, match=complaint) as caught:
+        invoke(cell, "--out", tmp_path / "out", *fast, *words)
+    assert "\n" not in str(caught.value)
+    assert not (tmp_path / "out").exists()
+
+
+def test_controller_prints_ready_and_ends_when_asked():
+    process = subprocess.Popen(
+        [
+            sys.executable,
+            "-c",
+            "from hecbench_hardware.commands import controller; controller()",
+            "--host",
+            "127.0.2.9",
+        ],
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout.readline() == "ready 127.0.2.9\n"
+    os.kill(process.pid, signal.SIGINT)
+    assert process.wait(5) == 0
+    process.stdout.close()
+    assert CliRunner().invoke(controller_verb, ["--help"]).exit_code == 0
