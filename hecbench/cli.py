@@ -10,21 +10,18 @@ from __future__ import annotations
 import os
 import shlex
 import sys
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from hecbench import __version__
+from hecbench import __version__, console
 from hecbench.errors import HecbenchError, InputError
 
 if TYPE_CHECKING:
-    from hecbench.estimate import Estimate
     from hecbench.recording import Recording
-    from hecbench.report.tables import Table
     from hecbench.runner import Options, Task
     from hecbench.specs import SolverSpec
 
@@ -94,7 +91,7 @@ def demo(out: Path, samples: int, seed: int) -> None:
     (out / store.FILE_NAME).unlink(missing_ok=True)
     levels = ("tag_2m", "small_tag_2m", "board_2m")
     contents = _run(_suite_tasks("markers", levels, samples, (), seed), out, seed, jobs=os.cpu_count() or 1)
-    _print_tables(contents.estimates)
+    console.print_tables(contents.estimates)
     path, _ = html.write(out)
     click.echo(f"report: {path}")
 
@@ -112,14 +109,14 @@ def plugins(kind: str | None, as_json: bool) -> None:
         raise InputError(f"--kind {kind}: choose one of {', '.join(Kind)}")
     rows = [plugin.row() for plugin in registry.load().select(Kind(kind) if kind else None)]
     if as_json:
-        _print_json(rows)
+        console.print_json(rows)
         return
     header = ("name", "kind", "status", "needs", "detail", "distribution")
     cells = [
         (r["name"], r["kind"] or "?", r["status"], ", ".join(r["needs"]), r["detail"], r["distribution"])
         for r in rows
     ]
-    _print_table(Table("plugins", header, tuple(cells), left=len(header)))
+    console.print_table(Table("plugins", header, tuple(cells), left=len(header)))
 
 
 @cli.command()
@@ -151,6 +148,7 @@ def solve(
     from hecbench.report.tables import Group, table
 
     loaded = _prepared(runner.load_recording(recording), views, init, seed)
+    console.print_notes(loaded.notes)
     specs = _specs(solvers, loaded)
     if not specs:
         raise HecbenchError(
@@ -160,10 +158,10 @@ def solve(
     for estimate in estimates if out else ():
         estimate.save(Path(str(out)) / f"{estimate.solver}.json")
     if as_json:
-        _print_json([estimate.to_json() for estimate in estimates])
+        console.print_json([estimate.to_json() for estimate in estimates])
     else:
-        _print_table(table(Group(loaded.name, tuple(estimates), is_level=False)))
-        _print_best(estimates[0])
+        console.print_table(table(Group(loaded.name, tuple(estimates), is_level=False)))
+        console.print_answer(estimates[0])
     answered = [estimate.status is Status.OK for estimate in estimates]
     if not any(answered) or (solvers and not all(answered)):
         sys.exit(1)
@@ -200,12 +198,11 @@ def run(
     tasks = _tasks(sources, solvers, levels, samples, seed)
     out = out or Path("out") / Path(sources[0]).name
     contents = _run(tasks, out, seed, jobs=jobs, resume=resume, held_out=held_out)
-    for sentence in contents.damage:
-        click.echo(sentence, err=True)
+    console.print_notes(contents.damage)
     if as_json:
-        _print_json([estimate.to_json() for estimate in contents.estimates])
+        console.print_json([estimate.to_json() for estimate in contents.estimates])
     else:
-        _print_tables(contents.estimates)
+        console.print_tables(contents.estimates)
     click.echo(f"results: {out}; see them with: hecbench report {out}", err=True)
     if not any(estimate.parent_T_camera is not None for estimate in contents.estimates):
         sys.exit(1)
@@ -219,11 +216,10 @@ def report(folder: Path, as_json: bool) -> None:
     from hecbench.report import html
 
     path, contents = html.write(folder)
-    for sentence in contents.damage:
-        click.echo(sentence, err=True)
+    console.print_notes(contents.damage)
     summary = {"report": str(path), "results": len(contents.estimates), "damage": contents.damage}
     if as_json:
-        _print_json(summary)
+        console.print_json(summary)
     else:
         click.echo(f"{path}: {len(contents.estimates)} results")
 
@@ -242,10 +238,10 @@ def conformance(name: str, as_json: bool) -> None:
 
     checks = check_solver(registry.load().get(Kind.SOLVER, name, SolverSpec))
     if as_json:
-        _print_json([asdict(check) for check in checks])
+        console.print_json([asdict(check) for check in checks])
     else:
         rows = tuple((check.name, "passed" if check.passed else "FAILED", check.detail) for check in checks)
-        _print_table(Table(name, ("check", "outcome", "detail"), rows, left=3))
+        console.print_table(Table(name, ("check", "outcome", "detail"), rows, left=3))
     if not all(check.passed for check in checks):
         sys.exit(1)
 
@@ -259,10 +255,83 @@ def doctor(as_json: bool) -> None:
 
     findings = examination.examine()
     if as_json:
-        _print_json([finding.row() for finding in findings])
+        console.print_json([finding.row() for finding in findings])
         return
     rows = tuple((f.subject, f.state, f.version, f.cure) for f in findings)
-    _print_table(Table("installation", ("what", "state", "version", "how to get it"), rows, left=4))
+    console.print_table(Table("installation", ("what", "state", "version", "how to get it"), rows, left=4))
+
+
+@cli.command()
+@click.argument("recording", type=_any_path)
+@_json
+def check(recording: Path, as_json: bool) -> None:
+    """Look for faults in a RECORDING before anything is solved; exits with 3 on a critical one."""
+    from hecbench import diagnose, runner
+    from hecbench.diagnose import Severity
+    from hecbench.report.tables import Table
+
+    loaded = runner.load_recording(recording)
+    findings = diagnose.check(loaded, runner.prepare)
+    if as_json:
+        rows = [finding.to_json() for finding in findings]
+        console.print_json({"recording": loaded.name, "findings": rows})
+    else:
+        cells = tuple((f.id, str(f.severity), f.summary, f.action) for f in findings)
+        console.print_table(
+            Table(loaded.name, ("finding", "severity", "what was found", "what to do"), cells, left=4)
+        )
+    if any(finding.severity is Severity.CRITICAL for finding in findings):
+        sys.exit(3)
+
+
+@cli.command(name="import")
+@click.argument("source", type=_any_path, metavar="SRC")
+@click.argument("destination", type=_folder, metavar="DEST")
+@click.option(
+    "--format", "format_name", metavar="F", help="A dataset of `hecbench plugins`; default: recognised."
+)
+def import_recording(source: Path, destination: Path, format_name: str | None) -> None:
+    """Read a recording SRC of any known format and write it as a native folder DEST."""
+    from hecbench import recording_io, registry, runner
+    from hecbench.specs import DatasetSpec, Kind
+
+    if recording_io.is_recording(destination):
+        raise InputError(f"{destination}: holds a recording already; give another destination")
+    if format_name is None:
+        loaded = runner.load_recording(source)
+    else:
+        loaded = registry.load().get(Kind.DATASET, format_name, DatasetSpec).load(source)
+    recording_io.save(loaded, destination)
+    console.print_notes(loaded.notes)
+    click.echo(f"{destination}: {loaded.name}, {loaded.mounting}, {len(loaded)} samples")
+
+
+@cli.command()
+@click.argument("estimate", type=_file)
+@click.option("--to", "format_name", required=True, metavar="F", help="An exporter of `hecbench plugins`.")
+@click.option("--out", type=_file, help="Write to this file instead of stdout.")
+@click.option("--parent", help="Name of the parent frame; default: the estimate's.")
+@click.option("--child", help="Frame to place, such as camera_link; default: the optical frame itself.")
+@click.option("--optical", help="Name of the camera's optical frame.")
+@click.option(
+    "--child-T-optical", "child_T_optical", metavar="'X Y Z QX QY QZ QW'", help="As tf2_echo prints it."
+)
+@click.option("--other-link", help="The robot's other end, where a format names both.")
+@click.option("--marker", help="Name of the target's frame, where a format names it.")
+def export(estimate: Path, format_name: str, out: Path | None, **options: str | None) -> None:
+    """Write an ESTIMATE in another program's format."""
+    from hecbench import estimate as estimates
+    from hecbench import files, registry
+    from hecbench.specs import ExporterSpec, Kind
+
+    exporter = registry.load().get(Kind.EXPORTER, format_name, ExporterSpec)
+    given = {name: value for name, value in options.items() if value is not None}
+    text = exporter.write(estimates.load(estimate), given)
+    if out is None:
+        click.echo(text, nl=not text.endswith("\n"))
+    else:
+        files.write_text(out, text)
+        click.echo(f"{out}: {exporter.summary}")
 
 
 def _prepared(recording: Recording, views: int | None, init: Path | None, seed: int) -> Recording:
@@ -365,64 +434,7 @@ def _run(
     from hecbench import runner
 
     options = replace(_options(seed, held_out), stop_on_bad_input=False)
-    with _progress(sum(len(task.solvers) for task in tasks)) as advance:
+    with console.progress(sum(len(task.solvers) for task in tasks)) as advance:
         return runner.run(
             tasks, options, out=out, jobs=jobs, resume=resume, on_result=lambda found: advance(len(found))
         )
-
-
-@contextmanager
-def _progress(total: int) -> Iterator[Callable[[int], None]]:
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = TextColumn("calibrations"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
-    console = Console(stderr=True)
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as progress:
-        bar = progress.add_task("", total=total)
-        yield lambda count: progress.advance(bar, count)
-
-
-def _print_json(value: Any) -> None:
-    import msgspec
-
-    click.echo(msgspec.json.format(msgspec.json.encode(value), indent=1))
-
-
-def _print_tables(estimates: Sequence[Estimate]) -> None:
-    from hecbench.report.tables import groups, table
-
-    for group in groups(estimates):
-        _print_table(table(group))
-
-
-def _print_table(table: Table) -> None:
-    from rich.console import Console
-    from rich.table import Table as RichTable
-
-    console = Console(width=None if sys.stdout.isatty() else 200)
-    shown = RichTable(title=table.title, title_justify="left", header_style="bold")
-    for number, name in enumerate(table.header):
-        shown.add_column(name, justify="left" if number < table.left else "right", overflow="fold")
-    for row in table.rows:
-        shown.add_row(*row)
-    console.print(shown, markup=False)
-    for note in table.notes:
-        console.print(note, style="dim", markup=False, highlight=False)
-    console.print()
-
-
-def _print_best(estimate: Estimate) -> None:
-    """The best answer as a transform with its frames named."""
-    import numpy as np
-
-    from hecbench import se3
-
-    if estimate.parent_T_camera is None:
-        return
-    parent_T_camera = estimate.parent_T_camera
-    translation = ", ".join(f"{value:.5f}" for value in parent_T_camera[:3, 3])
-    quaternion = ", ".join(f"{value:.6f}" for value in se3.to_quat_xyzw(parent_T_camera))
-    click.echo(f"{estimate.parent_link}_T_camera by {estimate.solver}:")
-    click.echo(f"  translation m: [{translation}]   quaternion x y z w: [{quaternion}]")
-    click.echo(np.array2string(parent_T_camera, precision=6, suppress_small=True, prefix="  "))

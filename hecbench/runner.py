@@ -6,7 +6,6 @@ import sys
 import traceback
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -72,15 +71,18 @@ def load_recording(path: Path) -> Recording:
 
 
 def prepare(recording: Recording) -> Recording:
-    """Compute what is not given from what is: robot poses from joints, corners from images, poses from
-    corners.
+    """Compute what is not given: robot poses from joints, corners from images, target poses from corners.
+
+    Why something could not be computed joins the recording's `notes`.
     """
     recording = with_robot_poses(recording)
     for need in _OBSERVED:
         for observer in registry.load().ready(Kind.OBSERVER, ObserverSpec):
             if observer.gives is need and observer.applies(recording):
-                with suppress(Refusal):  # the solvers that need it then refuse, with the same reason
+                try:
                     recording = observer.factory()(recording)
+                except Refusal as refusal:
+                    recording = replace(recording, notes=(*recording.notes, str(refusal)))
     return recording
 
 
@@ -129,7 +131,8 @@ def _solve_blind(blind: Recording, spec: SolverSpec, options: Options) -> Estima
     missing = [need for need in Need if need in spec.needs - blind.offers()]
     if missing:
         wanted = "; ".join(f"{need} ({_HOW_TO_GIVE[need]})" for need in missing)
-        return _unanswered(blind, spec, Status.REFUSED, f"the recording lacks {wanted}", 0.0)
+        reason = "; ".join([f"the recording lacks {wanted}", *blind.notes])
+        return _unanswered(blind, spec, Status.REFUSED, reason, 0.0)
     solver = spec.factory()
     rng = np.random.default_rng([options.seed, zlib.crc32(spec.name.encode())])
     start = perf_counter()
