@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 
 KNOWN_ARMS = ("ur3e", "ur5e")
 GRIPPER = "robotiq_2f_85"
-_NOT_ON_EVERY_ROBOT = ("base_link_inertia/cable*",)
+_NOT_ON_EVERY_ROBOT = ("base_link_inertia/cable*", "base_link_inertia/M_Text*")
 _LIMIT_TOLERANCE = 1e-6
 
 
@@ -207,7 +207,7 @@ def load_robot(name: str | Path, *, exclude: Iterable[str] = (), meshes: bool = 
     Args:
         name: the name or the path.
         exclude: shell patterns of parts, ``link/material``, that this robot does not have. The power cable
-            that the known models carry is always left out: it hangs elsewhere on every robot.
+            and the lettering that the known models carry are always left out: they are not on every robot.
         meshes: False loads the kinematics alone.
     """
     arm, _, tool = str(name).partition("+")

@@ -1,0 +1,6 @@
+"""The CPU rasteriser and its pose derivative; nothing else of the project knows how a triangle is filled."""
+
+from hecbench.rendering.mesh import RenderMesh
+from hecbench.rendering.renderer import Crossings, Renderer
+
+__all__ = ["Crossings", "RenderMesh", "Renderer"]

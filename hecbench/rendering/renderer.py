@@ -1,0 +1,230 @@
+"""Draw a robot by an exact pinhole camera: colour, coverage, depth, link and part, and how the image moves.
+
+The image is anti-aliased from the mesh's own edges: where a visible edge crosses between two pixel centres, the two
+pixels exchange what a straight edge would cover. The same crossings carry the derivative, so that image and
+derivative agree and only a few thousand pixels matter.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hecbench.errors import InputError
+from hecbench.rendering import kernels
+from hecbench.rendering.mesh import Float, Int, RenderMesh
+
+
+@dataclass(frozen=True, eq=False)
+class Crossings:
+    """C places where a visible edge crosses the segment between two neighbouring pixel centres p and q, at t.
+
+    Attributes:
+        pixels: (C, 2) flat indices of p and q; q is right of p or below it.
+        parts: (C, 2) of p and q, -1 for the background.
+        link: (C,) that the edge belongs to, and moves with.
+        t: (C,) in [0, 1], px from p.
+        point: (C, 3) m on the edge, camera frame.
+        gradient: (C, 3) px/m: dt by the motion of the point in the camera frame.
+        slope: (C,) of the edge, columns per row for horizontal pairs, rows per column for vertical ones.
+        mix: (C, 4): share of q's colour in p, its derivative by -t; share of p's colour in q, its derivative by t.
+    """
+
+    pixels: Int
+    parts: Int
+    link: Int
+    t: Float
+    point: Float
+    gradient: Float
+    slope: Float
+    mix: Float
+
+    def __len__(self) -> int:
+        return len(self.link)
+
+    @property
+    def horizontal(self) -> NDArray[np.bool_]:
+        """Which pairs (C,) are horizontal."""
+        return np.asarray(self.pixels[:, 1] - self.pixels[:, 0] == 1)
+
+    def pose_columns(self) -> NDArray[np.float64]:
+        """dt (C, 6) px by a left perturbation [phi rad, rho m] of camera_T_robot."""
+        gradient = self.gradient.astype(float)
+        return np.concatenate([np.cross(self.point.astype(float), gradient), gradient], 1)
+
+
+@dataclass(eq=False)
+class Renderer:
+    """Buffers for one mesh and one camera; every call overwrites the arrays that the last one returned.
+
+    Args:
+        mesh: what to draw.
+        K: (3, 3) px in OpenCV's convention, pixel centres at integers.
+        width: of the image, px.
+        height: of the image, px.
+    """
+
+    mesh: RenderMesh
+    K: ArrayLike
+    width: int
+    height: int
+    dropped: int = field(default=0, init=False)
+    """Front faces of the last pose that reach behind the near plane (0.05 m) and were not drawn."""
+
+    def __post_init__(self) -> None:
+        K = np.asarray(self.K, float)
+        if K.shape != (3, 3) or not np.isfinite(K).all() or K[0, 0] <= 0 or K[1, 1] <= 0:
+            raise InputError(f"K must be a finite 3x3 matrix with positive focal lengths, is {K.tolist()}")
+        if self.width < 2 or self.height < 2:
+            raise InputError(f"an image of {self.width}x{self.height} px cannot be drawn")
+        mesh, shape = self.mesh, (self.height, self.width)
+        capacity = max(4096, self.width * self.height // 4)
+        self._intrinsics = np.array([K[0, 0], K[0, 1], K[0, 2] + 0.5, K[1, 1], K[1, 2] + 0.5], np.float32)
+        self._face_link = mesh.part_link[mesh.face_part]
+        self._screen = np.zeros((3, mesh.vertices.shape[1]), np.float32)
+        self._front = np.zeros(len(mesh.faces), np.bool_)
+        self._order = np.zeros(2 * len(mesh.edge_ends) + len(mesh.faces) + 1, np.int32)
+        self._box = np.array([0, self.width - 1, 0, self.height - 1])
+        self._painted = self._box.copy()
+        self._background = np.full(4, np.nan, np.float32)
+        self._best = np.zeros((2, *shape), np.int32)
+        self._taken = np.zeros(2 * self.width * self.height, np.float32)
+        self._pair = np.zeros(capacity, np.int32)
+        self._place = np.zeros((capacity, 2), np.float32)
+        self._edge = np.zeros(capacity, np.int32)
+        self._ends = np.zeros((capacity, 4), np.int32)
+        self._link = np.zeros(capacity, np.int32)
+        self._point = np.zeros((capacity, 3), np.float32)
+        self._gradient = np.zeros((capacity, 3), np.float32)
+        self._slope = np.zeros(capacity, np.float32)
+        self._mix = np.zeros((capacity, 4), np.float32)
+        self._shade = np.zeros(0, np.float32)
+        self._count = 0
+        self._image = np.zeros((*shape, 4), np.float32)
+        self.nearness = np.zeros(shape, np.float32)
+        self.face = np.full(shape, -1, np.int32)
+
+    def draw(self, camera_T_link: ArrayLike) -> int:
+        """Rasterise the robot with its links at camera_T_link (L, 4, 4); returns the number of crossings.
+
+        Afterwards `image`, `crossings`, `depth`, `part` and `link` belong to this pose.
+        """
+        poses = np.asarray(camera_T_link)
+        if (
+            poses.shape[-2:] != (4, 4)
+            or len(poses) != len(self.mesh.vertex_start) - 1
+            or not np.isfinite(poses).all()
+        ):
+            raise InputError(
+                f"expected {len(self.mesh.vertex_start) - 1} finite link poses, got shape {poses.shape}"
+            )
+        mesh = self.mesh
+        kernels.project(
+            mesh.vertices,
+            mesh.vertex_start,
+            mesh.planes,
+            mesh.face_start,
+            np.ascontiguousarray(poses[:, :3], np.float32),
+            self._intrinsics,
+            self._screen,
+            self._front,
+        )
+        self.dropped = kernels.rasterise(
+            self._screen, mesh.faces, self._front, self._order, self.nearness, self.face, self._box
+        )
+        self._count = kernels.find_crossings(
+            self._screen,
+            mesh.edge_ends,
+            mesh.edge_faces,
+            mesh.edge_kinds,
+            self._front,
+            self._order,
+            self.face,
+            mesh.face_part,
+            self._face_link,
+            self.nearness,
+            self._box,
+            len(self._shade) > 0,
+            self._best,
+            self._pair,
+            self._place,
+            self._edge,
+        )
+        self._count = kernels.describe_crossings(
+            self._screen,
+            mesh.edge_ends,
+            mesh.edge_faces,
+            self.face,
+            mesh.face_part,
+            self._face_link,
+            self._intrinsics,
+            self._pair,
+            self._place,
+            self._edge,
+            self._count,
+            self._box,
+            self._taken,
+            self._ends,
+            self._link,
+            self._point,
+            self._gradient,
+            self._slope,
+            self._mix,
+        )
+        return self._count
+
+    def image(self, colours: ArrayLike | None = None, background: ArrayLike = (0, 0, 0)) -> Float:
+        """The anti-aliased picture (H, W, 4) of the last pose: RGB by part (P, 3), and coverage in [0, 1]."""
+        table = np.zeros((len(self.mesh.part_names) + 1, 4), np.float32)
+        table[:-1, :3] = self.mesh.colours if colours is None else colours
+        table[:-1, 3] = 1
+        table[-1, :3] = background
+        if not np.array_equal(table[-1], self._background):
+            self._image[:] = table[-1]
+            self._background = table[-1].copy()
+        kernels.compose(
+            self.face,
+            self.mesh.face_part,
+            self._shade,
+            table,
+            self._ends,
+            self._mix,
+            self._count,
+            self._box,
+            self._painted,
+            self._image,
+        )
+        return self._image
+
+    @property
+    def part(self) -> NDArray[np.int32]:
+        """Part (H, W) seen at each pixel centre, -1 for the background; a new array."""
+        return np.where(self.face >= 0, self.mesh.face_part[self.face], np.int32(-1))
+
+    @property
+    def link(self) -> NDArray[np.int32]:
+        """Link (H, W) seen at each pixel centre, -1 for the background; a new array."""
+        return np.where(self.face >= 0, self._face_link[self.face], np.int32(-1))
+
+    @property
+    def depth(self) -> NDArray[np.float32]:
+        """Depth (H, W) m along the optical axis at each pixel centre, inf for the background; a new array."""
+        with np.errstate(divide="ignore"):
+            return np.asarray(1 / self.nearness, np.float32)
+
+    @property
+    def crossings(self) -> Crossings:
+        """The crossings of the last pose: views, valid until the next `draw`."""
+        n = self._count
+        return Crossings(
+            pixels=self._ends[:n, :2],
+            parts=self._ends[:n, 2:],
+            link=self._link[:n],
+            t=self._place[:n, 0],
+            point=self._point[:n],
+            gradient=self._gradient[:n],
+            slope=self._slope[:n],
+            mix=self._mix[:n],
+        )
