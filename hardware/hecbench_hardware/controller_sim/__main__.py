@@ -21,6 +21,7 @@ def main(host: str, model: str, time_scale: str, version: str) -> None:
             time_scale=float(time_scale),
             version=(major, minor, bugfix, build),
             announce=announce,
+            lifeline=sys.stdin.buffer,
         )
     except HecbenchError as error:
         announce(str(error))

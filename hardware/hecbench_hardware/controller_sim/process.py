@@ -62,7 +62,7 @@ class SimulatedController:
         command = [sys.executable, "-P", "-m", "hecbench_hardware.controller_sim"]
         self._process = subprocess.Popen(
             [*command, host, self._model, str(self._time_scale), version],
-            stdin=subprocess.DEVNULL,
+            stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             text=True,
         )
@@ -103,8 +103,9 @@ class SimulatedController:
             process.kill()
             return process.wait()
         finally:
-            if process.stdout:
-                process.stdout.close()
+            for stream in (process.stdin, process.stdout):
+                if stream:
+                    stream.close()
 
     def __enter__(self) -> Self:
         """Start."""

@@ -13,6 +13,8 @@ import socket
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
+from typing import IO
 
 from hecbench.errors import InputError
 from hecbench_hardware.controller_sim.arm import SimulatedArm
@@ -68,17 +70,16 @@ class _Server:
                 ) from error
             listener.listen(8)
             listener.setblocking(False)
-            self.selector.register(listener, selectors.EVENT_READ, None)
+            self.selector.register(listener, selectors.EVENT_READ, partial(self.accept, listener))
 
     def run(self, go_on: Callable[[], bool]) -> None:
         due = time.monotonic()
         while go_on():
             for key, _ in self.selector.select(max(0.0, due - time.monotonic())):
-                if key.data is None:
-                    assert isinstance(key.fileobj, socket.socket)
-                    self.accept(key.fileobj)
-                else:
+                if isinstance(key.data, _Connection):
                     self.read(key.data)
+                else:
+                    key.data()
             now = time.monotonic()
             if now >= due:
                 due = now + CYCLE_S if now - due > _LATE_CYCLES * CYCLE_S else due + CYCLE_S
@@ -88,8 +89,8 @@ class _Server:
 
     def close(self) -> None:
         for key in list(self.selector.get_map().values()):
-            assert isinstance(key.fileobj, socket.socket)
-            key.fileobj.close()
+            if isinstance(key.fileobj, socket.socket):
+                key.fileobj.close()
         self.selector.close()
 
     def accept(self, listener: socket.socket) -> None:
@@ -186,6 +187,7 @@ def serve(
     time_scale: float = 1.0,
     version: tuple[int, int, int, int] = VERSION,
     announce: Callable[[str], object] = lambda line: None,
+    lifeline: IO[bytes] | None = None,
 ) -> None:
     """Be a controller at a loopback address until SIGTERM or SIGINT; announces ``ready HOST`` on listening.
 
@@ -195,6 +197,7 @@ def serve(
         time_scale: Seconds of the controller's time per second of the wall.
         version: The software version that it claims.
         announce: Called once with the ready line.
+        lifeline: The server ends when this stream does, so that it does not outlive its parent.
 
     Raises:
         InputError: An address outside the loopback range, a taken port, or a time scale not above 0.
@@ -210,7 +213,9 @@ def serve(
     server = _Server(host, version, program)
     try:
         server.listen()
-        stopped = []
+        stopped: list[bool] = []
+        if lifeline:
+            server.selector.register(lifeline, selectors.EVENT_READ, lambda: stopped.append(True))
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, lambda *_: stopped.append(True))
         announce(f"ready {host}")

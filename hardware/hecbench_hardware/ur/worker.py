@@ -20,6 +20,8 @@ from typing import Any
 CONNECT_S = 5.0
 CALL_S = 1.0
 LEAVE_S = 1.0
+BEGIN_S = 0.02
+"""An accepted motion shows in the status some cycles later."""
 WATCHDOG_HZ = 2.0
 """The controller ends the program by itself when it hears nothing for half a second."""
 KICK_S = 0.15
@@ -69,8 +71,13 @@ class Control:
 
     def start(self, name: str, *args: Any) -> int | None:
         """Start an asynchronous motion; the number of the one before it, or None when it was not accepted."""
-        before = self._interface.getAsyncOperationProgressEx().operationId()
-        return before if getattr(self._interface, name)(*args, True) else None
+        before = self.progress()[0]
+        if not getattr(self._interface, name)(*args, True):
+            return None
+        deadline = time.monotonic() + BEGIN_S
+        while self.progress()[0] == before and time.monotonic() < deadline:
+            time.sleep(BEGIN_S / 100)
+        return before
 
     def progress(self) -> tuple[int, bool, bool]:
         """Number of the motion, whether it runs, and whether the control script does."""
