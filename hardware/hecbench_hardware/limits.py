@@ -137,6 +137,16 @@ def linear_path(arm: UrArm, start: Array, base_T_target: Array) -> Array:
     return np.array(path)
 
 
+def line_speed_m_s(path: Array, length_m: float, joint_speed_rad_s: float) -> float:
+    """The tool speed at which no joint on an evenly sampled line (N, 6) rad is faster than allowed.
+
+    Infinite for a turn on the spot, whose pace the controller chooses.
+    """
+    step_rad = float(np.abs(np.diff(path, axis=0)).max())
+    step_m = length_m / (len(path) - 1)
+    return joint_speed_rad_s * step_m / step_rad if step_m > 1e-6 and step_rad > 0 else float("inf")
+
+
 def check_path(arm: UrArm, path: Array, limits: Limits) -> None:
     """Refuse joints (N, 6) rad whose joints, tool or links leave the limits anywhere on the way.
 

@@ -9,6 +9,7 @@ from hecbench_hardware.limits import (
     Sphere,
     check_path,
     joint_path,
+    line_speed_m_s,
     linear_path,
     link_points,
     load_limits,
@@ -41,6 +42,17 @@ def test_linear_path_stays_on_the_line(ready_pose):
     direction = (target - start)[:3, 3] / np.linalg.norm((target - start)[:3, 3])
     offsets = poses[:, :3, 3] - start[:3, 3]
     assert np.abs(offsets - np.outer(offsets @ direction, direction)).max() < 1e-9
+
+
+def test_a_line_is_slowed_until_no_joint_is_too_fast(ready_pose):
+    target = ARM.forward(ready_pose).copy()
+    target[:3, 3] += [0.1, 0.1, 0.05]
+    path = linear_path(ARM, ready_pose, target)
+    speed = line_speed_m_s(path, 0.15, 0.5)
+    fastest = np.abs(np.diff(path, axis=0)).max() / (0.15 / (len(path) - 1) / speed)
+    assert fastest == pytest.approx(0.5)
+    assert line_speed_m_s(path, 0.0, 0.5) == np.inf
+    assert line_speed_m_s(ready_pose[None].repeat(2, 0), 0.1, 0.5) == np.inf
 
 
 def test_linear_path_refuses_a_singularity():

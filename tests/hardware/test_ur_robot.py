@@ -307,3 +307,17 @@ def test_a_killed_program_leaves_no_process_and_no_motion(controller, connect, n
         program.kill()
         program.wait()
         program.stdout.close()
+
+
+def test_an_interrupted_request_does_not_shift_the_answers(robot, monkeypatch):
+    """As Ctrl-C between sending and receiving does."""
+    connection = robot._control.connection
+
+    def interrupted(timeout_s):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(type(connection), "poll", lambda self, timeout_s=0: interrupted(timeout_s))
+        with pytest.raises(KeyboardInterrupt):
+            robot._control.request("call", "getTCPOffset")
+    assert robot._request("call", "isSteady") is True

@@ -41,6 +41,7 @@ class Worker:
         self.connection = Connection(os.dup(ours.fileno()))
         ours.close()
         self._lock = threading.Lock()
+        self._number = 0
 
     @property
     def pid(self) -> int:
@@ -68,11 +69,14 @@ class Worker:
             HecbenchError: The client refused, in its own words.
         """
         with self._lock:
+            self._number += 1
             try:
-                self.connection.send((name, args, deadline_s))
-                if not self.connection.poll(deadline_s + _GRACE_S):
-                    raise EOFError
-                fine, result = self.connection.recv()
+                self.connection.send((self._number, name, args, deadline_s))
+                number = -1
+                while number != self._number:  # an interrupted request leaves its answer behind
+                    if not self.connection.poll(deadline_s + _GRACE_S):
+                        raise EOFError
+                    number, fine, result = self.connection.recv()
             except (EOFError, OSError):
                 self.end()
                 raise WorkerGone(f"{' '.join([name, *map(str, args[:1])])} had no answer") from None

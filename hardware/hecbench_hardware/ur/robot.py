@@ -204,7 +204,10 @@ class UrRobot:
         self._target = target
 
     def move_linear(self, base_T_flange: Array, *, speed_m_s: float | None = None) -> None:
-        """Straight in space; the path is checked first. Raises as `move_joints` does."""
+        """Straight in space; the path is checked first, and slowed where a joint would be too fast.
+
+        Raises as `move_joints` does.
+        """
         speed = _speed(speed_m_s, self.limits.tool_speed_m_s, "m/s")
         start = self._ready_joints()
         path = bounds.linear_path(self.arm, start, np.asarray(base_T_flange, float))
@@ -215,6 +218,7 @@ class UrRobot:
         acceleration = self.limits.tool_acceleration_m_s2
         length = float(np.linalg.norm(base_T_tcp[:3, 3] - self._stream.latest.tcp_vector[:3]))
         turn = float(np.abs(np.diff(path, axis=0)).sum(axis=0).max())
+        speed = min(speed, bounds.line_speed_m_s(path, length, self.limits.joint_speed_rad_s))
         expected_s = bounds.motion_time_s(length, speed, acceleration) + bounds.motion_time_s(
             turn, self.limits.joint_speed_rad_s, self.limits.joint_acceleration_rad_s2
         )

@@ -119,7 +119,7 @@ CLIENTS: dict[str, type[Control] | type[Outputs]] = {"control": Control, "output
 
 
 def serve(role: str, host: str, connection: Connection) -> Control | Outputs | None:
-    """Answer requests ``(method, args, deadline_s)`` until the parent says None or is gone; then leave.
+    """Answer requests ``(number, method, args, deadline_s)`` until the parent says None or is gone; then leave.
 
     Returns the client, so that its destructor does not run; None when it did not connect.
     """
@@ -142,7 +142,8 @@ def serve(role: str, host: str, connection: Connection) -> Control | Outputs | N
             request = connection.recv()
             if request is None:
                 break
-            connection.send(_answer(client, *request))
+            number, *call = request
+            connection.send((number, *_answer(client, *call)))
     except (EOFError, OSError):
         pass
     with ends_after(LEAVE_S):
