@@ -11,12 +11,14 @@ import numpy as np
 import psutil
 import pytest
 from hecbench_hardware.arming import take_control
+from hecbench_hardware.controller_sim.process import SimulatedController
 from hecbench_hardware.devices import DeviceFault, Fault
 from hecbench_hardware.kinematics import ARMS
 from hecbench_hardware.limits import Box, Limits
 from hecbench_hardware.ur.dashboard import Dashboard
 from hecbench_hardware.ur.outputs import Outputs
 from hecbench_hardware.ur.robot import UrRobot
+from hecbench_hardware.ur.stream import Supervision
 
 from hecbench import se3
 from hecbench.errors import InputError
@@ -279,6 +281,7 @@ import numpy as np
 from hecbench_hardware.kinematics import ARMS
 from hecbench_hardware.ur.robot import UrRobot
 from hecbench_hardware.ur.stream import Supervision
+from hecbench_hardware.ur.stream import Supervision
 robot = UrRobot(sys.argv[1], ARMS["ur5e"], supervision=Supervision(max_age_s=1.0))
 robot.enable()
 print("moving", flush=True)
@@ -321,3 +324,17 @@ def test_an_interrupted_request_does_not_shift_the_answers(robot, monkeypatch):
         with pytest.raises(KeyboardInterrupt):
             robot._control.request("call", "getTCPOffset")
     assert robot._request("call", "isSteady") is True
+
+
+def test_two_arms_at_once(robot, ready_pose):
+    with SimulatedController(model="ur3e", time_scale=50.0) as other:
+        supervision = Supervision(max_age_s=1.0)
+        with UrRobot(other.host, ARMS["ur3e"], supervision=supervision) as second:
+            second.enable()
+            movers = [threading.Thread(target=arm.move_joints, args=(ready_pose,)) for arm in (robot, second)]
+            for mover in movers:
+                mover.start()
+            for mover in movers:
+                mover.join()
+            for arm in (robot, second):
+                assert np.abs(arm.settle().joints_rad - ready_pose).max() < 1e-9
