@@ -8,12 +8,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench_plugins.detection.orientation import unmirrored
+from hecbench_plugins.detection.orientation import is_regular, unmirrored
 
 Array = NDArray[np.float64]
 Grey = NDArray[np.uint8]
 
 _WINDOW_PX = (2, 10)
+_LEAST_CONTRAST = 1.2
 
 
 def corners(grey: Grey, columns: int, rows: int) -> Array | None:
@@ -27,17 +28,21 @@ def corners(grey: Grey, columns: int, rows: int) -> Array | None:
     for thorough in (0, cv2.CALIB_CB_EXHAUSTIVE):
         flags = cv2.CALIB_CB_NORMALIZE_IMAGE | thorough
         found, points = cv2.findChessboardCornersSB(grey, (columns, rows), flags=flags)
-        if found:
-            break
-    else:
-        return None
-    criteria = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 50, 1e-3)
-    window = _window(points.reshape(rows, columns, 2))
-    points = cv2.cornerSubPix(grey, points, (window, window), (-1, -1), criteria)
-    grid = unmirrored(np.asarray(points, float).reshape(rows, columns, 2))
-    if (columns + rows) % 2 and not _first_square_is_light(grey, grid):
-        grid = grid[::-1, ::-1]
-    return grid.reshape(-1, 2)
+        if not found:
+            continue
+        window = _window(points.reshape(rows, columns, 2))
+        points = cv2.cornerSubPix(grey, points, (window, window), (-1, -1), _criteria())
+        grid = unmirrored(np.asarray(points, float).reshape(rows, columns, 2))
+        lightness = _first_square_lightness(grey, grid)
+        if is_regular(grid) and abs(lightness) > _LEAST_CONTRAST:
+            return (grid[::-1, ::-1] if (columns + rows) % 2 and lightness < 0 else grid).reshape(-1, 2)
+    return None
+
+
+def _criteria() -> tuple[int, int, float]:
+    import cv2
+
+    return cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 50, 1e-3
 
 
 def _window(grid: Array) -> int:
@@ -46,11 +51,14 @@ def _window(grid: Array) -> int:
     return int(np.clip(min(sides) / 3, *_WINDOW_PX))
 
 
-def _first_square_is_light(grey: Grey, grid: Array) -> bool:
-    """Whether the squares of the first one's colour are lighter than the others."""
+def _first_square_lightness(grey: Grey, grid: Array) -> float:
+    """How much lighter the squares of the first one's colour are than the others, in standard deviations of
+    all: 2 on a chessboard with the first one light, -2 with it dark, about 0 on anything else."""
     centres = (grid[:-1, :-1] + grid[1:, :-1] + grid[:-1, 1:] + grid[1:, 1:]) / 4
     x, y = np.rint(centres).astype(int).transpose(2, 0, 1)
     brightness = grey[np.clip(y, 0, grey.shape[0] - 1), np.clip(x, 0, grey.shape[1] - 1)].astype(float)
     row, column = np.indices(brightness.shape)
     same = (row + column) % 2 == 0
-    return bool(brightness[same].mean() > brightness[~same].mean())
+    if same.all():
+        return 0.0
+    return float((brightness[same].mean() - brightness[~same].mean()) / max(brightness.std(), 1.0))

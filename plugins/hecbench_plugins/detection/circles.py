@@ -12,33 +12,38 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench_plugins.detection.orientation import turned_grids, unmirrored
+from hecbench_plugins.detection.orientation import is_regular, turned_grids, unmirrored
 
 Array = NDArray[np.float64]
 Grey = NDArray[np.uint8]
 
 _LARGER = 1.25
-_AREA_PX = (20.0, 20000.0)
+_LEAST_AREA_PX = 20.0
 
 
 def centres(grey: Grey, columns: int, rows: int) -> tuple[Array, bool] | None:
     """Centres (columns * rows, 2) px, row by row, and whether a larger dot said which is first; or None."""
     import cv2
 
-    detector = _blob_detector()
+    detector = _blob_detector(grey.size / (columns * rows))
     for picture in (grey, 255 - grey):
         for flags in (cv2.CALIB_CB_SYMMETRIC_GRID, cv2.CALIB_CB_SYMMETRIC_GRID | cv2.CALIB_CB_CLUSTERING):
             found, points = cv2.findCirclesGrid(picture, (columns, rows), flags=flags, blobDetector=detector)
             if found:
                 grid = unmirrored(np.asarray(points, float).reshape(rows, columns, 2))
-                return _first_at_larger_dot(grid, detector.detect(picture))
+                if is_regular(grid):
+                    return _first_at_larger_dot(grid, detector.detect(picture))
     return None
 
 
-def _blob_detector() -> Any:
+def _blob_detector(cell_px: float) -> Any:
+    """Finds dots that fill up to half a cell of so many pixels.
+
+    Without the limit the board's own outline is a blob too, and pulls dots towards its centre.
+    """
     cv2: Any = import_module("cv2")
     parameters = cv2.SimpleBlobDetector_Params()
-    parameters.minArea, parameters.maxArea = _AREA_PX
+    parameters.minArea, parameters.maxArea = _LEAST_AREA_PX, cell_px / 2
     parameters.minThreshold, parameters.maxThreshold, parameters.thresholdStep = 20, 220, 10
     parameters.minDistBetweenBlobs = 5
     parameters.filterByInertia = False

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel
 
@@ -17,6 +18,7 @@ LEAST_POINTS = 6
 _ENOUGH_FOR_ALL_TERMS = 10
 """Below so many images only k1 and k2 are estimated: the tangential terms and k3 would fit the noise."""
 _MOST_UNCERTAIN = 0.1
+_LEAST_TILT_RAD = np.deg2rad(8.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,11 +57,18 @@ def calibrate(points_m: Array, corners_px: Array, size: tuple[int, int]) -> Cali
     if len(used) < _ENOUGH_FOR_ALL_TERMS:
         flags = cv2.CALIB_FIX_K3 | cv2.CALIB_ZERO_TANGENT_DIST
     try:
-        rms, K, distortion, _, _, sigmas, _, _ = cv2.calibrateCameraExtended(
+        rms, K, distortion, rotvecs, _, sigmas, _, _ = cv2.calibrateCameraExtended(
             object_points, image_points, size, None, None, flags=flags
         )
     except cv2.error as error:
         raise InputError(f"camera.K: the views do not determine it ({error.err}); tilt the target") from error
+    normals = se3.so3_exp(np.reshape(rotvecs, (-1, 3)))[:, :, 2]
+    tilt = float(np.arccos(np.clip(normals @ normals.T, -1, 1)).max())
+    if tilt < _LEAST_TILT_RAD:
+        raise InputError(
+            f"camera.K: the views are within {np.rad2deg(tilt):.1f} degrees of each other, which leaves the "
+            "focal length open; tilt the target"
+        )
     sigma = float(np.max(sigmas[:2]))
     if not np.isfinite(K).all() or not sigma < _MOST_UNCERTAIN * K[0, 0]:
         raise InputError(

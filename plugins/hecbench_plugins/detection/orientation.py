@@ -16,12 +16,33 @@ Array = NDArray[np.float64]
 
 _ANGLE_SIGMA_RAD = np.deg2rad(2.0)
 _ROBUST_LIMIT = 25.0
+_IRREGULAR = 0.15
 
 
 def unmirrored(grid: Array) -> Array:
     """The grid (rows, columns, 2) with its columns reversed if it was seen from behind."""
     x, y = grid[0, -1] - grid[0, 0], grid[-1, 0] - grid[0, 0]
     return grid if x[0] * y[1] - x[1] * y[0] > 0 else grid[:, ::-1]
+
+
+def is_regular(grid: Array) -> bool:
+    """Whether the points (rows, columns, 2) are the picture of a grid: a homography fits to a fraction of a cell.
+
+    The fit is the direct linear transformation (Hartley and Zisserman 2004, algorithm 4.2); lenses bend a grid
+    by less.
+    """
+    rows, columns = grid.shape[:2]
+    v, u = np.mgrid[:rows, :columns].reshape(2, -1) / max(rows, columns) - 0.5
+    centre, scale = grid.reshape(-1, 2).mean(0), grid.std()
+    x, y = ((grid.reshape(-1, 2) - centre) / scale).T
+    one, zero = np.ones_like(u), np.zeros_like(u)
+    first = np.stack([u, v, one, zero, zero, zero, -x * u, -x * v, -x], 1)
+    second = np.stack([zero, zero, zero, u, v, one, -y * u, -y * v, -y], 1)
+    H = np.linalg.svd(np.vstack([first, second]))[2][-1].reshape(3, 3)
+    fitted = np.stack([u, v, one], 1) @ H.T
+    gaps = (fitted[:, :2] / fitted[:, 2:] - np.stack([x, y], 1)) * scale
+    cells = [np.linalg.norm(np.diff(grid, axis=axis), axis=2).min() for axis in (0, 1)]
+    return bool(np.sqrt((gaps**2).sum(1).mean()) < _IRREGULAR * min(cells))
 
 
 def turned_grids(grid: Array) -> list[Array]:
