@@ -187,6 +187,6 @@ def _print(recording: Recording, out: Path, as_json: bool) -> None:
         click.echo(f"{out}: {len(recording)} samples")
         for finding in findings:
             if finding.severity is not Severity.OK:
-                click.echo(f"{finding.severity}: {finding.summary} {finding.action}".rstrip())
+                click.echo(f"{finding.severity}: {finding.summary}; {finding.action}".rstrip("; "))
     if any(finding.severity is Severity.CRITICAL for finding in findings):
         sys.exit(3)

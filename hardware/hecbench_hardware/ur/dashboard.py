@@ -32,9 +32,9 @@ class Dashboard:
                     answer = lines.readline().strip()
         except OSError as error:
             detail = f"the dashboard does not answer ({error.strerror or 'time-out'})"
-            raise DeviceFault(Fault.LINK_LOST, self.host, detail) from None
+            raise DeviceFault(Fault.LINK_LOST, f"robot {self.host}", detail) from None
         if not answer:
-            raise DeviceFault(Fault.LINK_LOST, self.host, f"no answer to '{command}'")
+            raise DeviceFault(Fault.LINK_LOST, f"robot {self.host}", f"no answer to '{command}'")
         return answer
 
     def is_simulated(self) -> bool:

@@ -23,7 +23,7 @@ class Outputs:
         probe(host)
         self._worker: Worker | None = Worker("outputs", host)
         try:
-            self._worker.ready(raw=False)
+            self._worker.ready()
         except (WorkerGone, HecbenchError) as error:
             raise explained(self._device, str(error)) from None
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import socket
 import subprocess
 import sys
@@ -38,8 +37,7 @@ class Worker:
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
             )
-        self.connection = Connection(os.dup(ours.fileno()))
-        ours.close()
+        self.connection = Connection(ours.detach())
         self._lock = threading.Lock()
         self._number = 0
 
@@ -48,18 +46,23 @@ class Worker:
         """Process id."""
         return self._process.pid
 
-    def ready(self, *, raw: bool) -> None:
-        """Wait for the first message; raises `HecbenchError` with the client's own words when it failed."""
+    def ready(self) -> None:
+        """Wait until the client is connected.
+
+        Raises:
+            WorkerGone: It did not connect in time.
+            HecbenchError: It was refused, in its own words.
+        """
         try:
             if not self.connection.poll(_START_S):
                 raise EOFError
-            failure = self.connection.recv_bytes().decode() if raw else self.connection.recv()[1]
+            refusal = self.connection.recv()
         except (EOFError, OSError):
             self.end()
             raise WorkerGone("the client did not connect") from None
-        if failure:
+        if refusal:
             self.end()
-            raise HecbenchError(failure)
+            raise HecbenchError(refusal)
 
     def request(self, name: str, *args: object, deadline_s: float = worker.CALL_S) -> Any:
         """Ask for one method and wait for its result, at most `deadline_s` and a little.

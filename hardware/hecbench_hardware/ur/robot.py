@@ -150,7 +150,7 @@ class UrRobot:
     def _take_control(self) -> None:
         worker = Worker("control", self.host)
         try:
-            worker.ready(raw=False)
+            worker.ready()
         except (WorkerGone, HecbenchError) as error:
             if found := fault_of(self._stream.latest):
                 raise DeviceFault(found[0], self.name, found[1]) from None
@@ -244,11 +244,11 @@ class UrRobot:
             before = self._request("start", name, target, speed, acceleration)
             if before is None:
                 raise self._why_program_ended()
-            while not self._has_ended(before):
+            while not self._has_ended(before) and not self._stopping.wait(POLL_S):
                 if self._is_late(first, allowed_s):
                     raise DeviceFault(Fault.LATE, self.name, f"a motion of {expected_s:.1f} s does not end")
-                if self._stopping.wait(POLL_S):
-                    raise DeviceFault(Fault.STOPPED, self.name, "stopped on request")
+            if self._stopping.is_set():  # a motion that was braked has ended too, elsewhere
+                raise DeviceFault(Fault.STOPPED, self.name, "stopped on request")
         except BaseException:
             self.stop()
             raise

@@ -101,7 +101,7 @@ class StateStream:
         self._supervision = supervision
         self._worker = Worker("receive", host)
         try:
-            self._worker.ready(raw=True)
+            self._worker.ready()
             content = self._worker.connection.recv_bytes()
         except (WorkerGone, HecbenchError, EOFError, OSError) as error:
             self._worker.end()

@@ -127,9 +127,9 @@ def serve(role: str, host: str, connection: Connection) -> Control | Outputs | N
         with ends_after(CONNECT_S):
             client = CLIENTS[role](host)
     except RuntimeError as error:
-        connection.send((False, str(error)))
+        connection.send(str(error))
         return None
-    connection.send((True, None))
+    connection.send(None)
     kicked = time.monotonic()
     try:
         while True:
@@ -169,9 +169,9 @@ def receive(host: str, connection: Connection) -> Any:
         with ends_after(CONNECT_S):
             client = rtde_receive.RTDEReceiveInterface(host, STREAM_HZ, VARIABLES)
     except RuntimeError as error:
-        connection.send_bytes(str(error).encode())
+        connection.send(str(error))
         return None
-    connection.send_bytes(b"")
+    connection.send(None)
     try:
         while True:
             connection.send_bytes(_sample(client))

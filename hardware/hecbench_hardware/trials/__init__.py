@@ -1,0 +1,1 @@
+"""Trials: what a gripper achieves with a calibration."""
