@@ -7,7 +7,6 @@ from math import pi
 
 import numpy as np
 import pytest
-
 from hecbench_hardware.kinematics import ARMS, wrap
 
 POSES = 10_000
