@@ -84,7 +84,7 @@ def placement(estimate: Estimate, options: Mapping[str, str]) -> Placement:
     child = _frame(options.get("child") or optical)
     if parent == child:
         raise InputError(f"export: '{parent}' cannot be its own child; name another --child")
-    origin = re.sub(r"[^\w .:/+]+", "_", f"{estimate.solver} on {estimate.recording}")
+    origin = re.sub(r"[^\w .:/+-]+|-{2,}", "_", f"{estimate.solver} on {estimate.recording}")
     if child == optical:
         return Placement(parent, child, estimate.parent_T_camera, f"{origin}, the camera's optical frame")
     given = options.get("child_T_optical")
