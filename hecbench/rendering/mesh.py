@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.robot import RobotModel
 from hecbench.robot_meshes import Part
@@ -93,6 +95,15 @@ class RenderMesh:
             error_m=max(link.moved for link in welded),
         )
 
+    def scaled(self, frame_T_link: NDArray[np.float64], scale: NDArray[np.float64]) -> RenderMesh:
+        """The robot stretched by `scale` (3,) along the axes of a frame, at one configuration (L, 4, 4)."""
+        vertices = self.vertices.T.astype(float)
+        for link, (first, last) in enumerate(pairwise(self.vertex_start)):
+            stretched = se3.transform_points(frame_T_link[link], vertices[first:last]) * scale
+            vertices[first:last] = se3.transform_points(se3.inverse(frame_T_link[link]), stretched)
+        planes = _planes(vertices, self.faces).astype(np.float32)
+        return replace(self, vertices=np.ascontiguousarray(vertices.T, np.float32), planes=planes)
+
 
 @dataclass(frozen=True)
 class _Welded:
@@ -146,7 +157,7 @@ def _in_order_of_use(
     return vertices[used], renamed[faces]
 
 
-def _planes(vertices: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.float64]:
+def _planes(vertices: NDArray[np.float64], faces: NDArray[np.integer]) -> NDArray[np.float64]:
     a, b, c = (vertices[faces[:, corner]] for corner in range(3))
     normal = np.cross(b - a, c - a)
     length = np.linalg.norm(normal, axis=1, keepdims=True)

@@ -70,6 +70,10 @@ class Renderer:
     K: ArrayLike
     width: int
     height: int
+    box: Int = field(init=False)
+    """x0, x1, y0, y1 (inclusive) of the pixels that the robot covered in the last `draw`."""
+    painted: Int = field(init=False)
+    """The same of the pixels that the last `image` touched; all others show the background."""
     dropped: int = field(default=0, init=False)
     """Front faces of the last pose that reach behind the near plane (0.05 m) and were not drawn."""
 
@@ -86,8 +90,8 @@ class Renderer:
         self._screen = np.zeros((3, mesh.vertices.shape[1]), np.float32)
         self._front = np.zeros(len(mesh.faces), np.bool_)
         self._order = np.zeros(2 * len(mesh.edge_ends) + len(mesh.faces) + 1, np.int32)
-        self._box = np.array([0, self.width - 1, 0, self.height - 1])
-        self._painted = self._box.copy()
+        self.box = np.array([0, self.width - 1, 0, self.height - 1], np.int32)
+        self.painted = self.box.copy()
         self._background = np.full(4, np.nan, np.float32)
         self._best = np.zeros((2, *shape), np.int32)
         self._taken = np.zeros(2 * self.width * self.height, np.float32)
@@ -132,7 +136,7 @@ class Renderer:
             self._front,
         )
         self.dropped = kernels.rasterise(
-            self._screen, mesh.faces, self._front, self._order, self.nearness, self.face, self._box
+            self._screen, mesh.faces, self._front, self._order, self.nearness, self.face, self.box
         )
         self._count = kernels.find_crossings(
             self._screen,
@@ -145,7 +149,7 @@ class Renderer:
             mesh.face_part,
             self._face_link,
             self.nearness,
-            self._box,
+            self.box,
             len(self._shade) > 0,
             self._best,
             self._pair,
@@ -164,7 +168,7 @@ class Renderer:
             self._place,
             self._edge,
             self._count,
-            self._box,
+            self.box,
             self._taken,
             self._ends,
             self._link,
@@ -192,8 +196,8 @@ class Renderer:
             self._ends,
             self._mix,
             self._count,
-            self._box,
-            self._painted,
+            self.box,
+            self.painted,
             self._image,
         )
         return self._image

@@ -1,0 +1,196 @@
+"""What a renderer method compares: per view and level of a pyramid, a renderer and the observed picture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hecbench.errors import InputError, Refusal
+from hecbench.recording import Recording
+from hecbench.rendering import Renderer, RenderMesh
+from hecbench.rendering.undistort import Undistortion
+from hecbench.robot import RobotModel, load_robot
+
+Array = NDArray[np.float64]
+Picture = NDArray[np.float32]
+
+LEVELS = (4, 2, 1)
+"""Pixels of the recording per pixel of a level, coarse to fine."""
+_COARSE_CELL_M = {4: 0.004, 2: 0.0015, 1: 0.0}
+_LEAST_MASK, _MOST_MASK = 1e-3, 0.95
+_BACKGROUND_SPREAD = 0.08
+
+
+@lru_cache(maxsize=4)
+def robot_and_meshes(name: str | Path) -> tuple[RobotModel, dict[int, RenderMesh]]:
+    """The model and its meshes by level; merged cells move no contour by more than a tenth of a level's pixel."""
+    model = load_robot(name)
+    return model, {level: RenderMesh.of(model, cell_m=_COARSE_CELL_M[level]) for level in LEVELS}
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """One view at one size."""
+
+    renderer: Renderer
+    observed: Picture
+    """(h, w, 4): RGB, 0 outside the mask when `masked`, and the mask, all in [0, 1]."""
+    background: NDArray[np.float32]
+    """(4,), the last 0."""
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """One sample: where the links are in the parent frame, and its pyramid."""
+
+    parent_T_link: Array
+    levels: dict[int, Level]
+    raw: Picture
+    """(H, W, 3) undistorted, not cut by the mask."""
+    has_image: bool
+    uniform_background: bool
+
+
+def prepare(recording: Recording) -> tuple[RobotModel, list[View]]:
+    """The robot and the views of a recording.
+
+    Raises:
+        Refusal: no intrinsics, robot, joints or pictures, or a mask without (or with nothing but) robot.
+    """
+    robot, camera = recording.robot, recording.camera
+    if robot is None or (robot.model is None and robot.urdf is None):
+        raise Refusal("the recording names no robot model")
+    if camera is None or camera.K is None:
+        raise Refusal("the camera's intrinsics are unknown")
+    if recording.joints_rad is None:
+        raise Refusal("no sample has joints_rad")
+    try:
+        model, meshes = robot_and_meshes(robot.urdf or str(robot.model))
+        names = robot.joint_names or model.joint_names[: recording.joints_rad.shape[1]]
+        rows = np.flatnonzero(np.isfinite(recording.joints_rad).all(1))
+        poses = model.link_poses(recording.joints_rad[rows], names, frame=recording.parent_link)
+        pinhole = Undistortion.of(camera)
+        views = [
+            _view(recording, int(row), parent_T_link, meshes, pinhole)
+            for row, parent_T_link in zip(rows, poses, strict=True)
+        ]
+    except InputError as error:
+        raise Refusal(str(error)) from error
+    found = [view for view in views if view is not None]
+    if not found:
+        raise Refusal("no sample with joints has an image or a mask")
+    return model, found
+
+
+def _view(
+    recording: Recording, row: int, parent_T_link: Array, meshes: dict[int, RenderMesh], pinhole: Undistortion
+) -> View | None:
+    has_image = recording.images is not None and recording.images[row] is not None
+    has_mask = recording.masks is not None and recording.masks[row] is not None
+    if not has_image and not has_mask:
+        return None
+    where = f"samples[{row}]"
+    raw: Picture | None = None
+    uniform, background = False, np.zeros(3, np.float32)
+    if has_image:
+        raw = pinhole.image(np.asarray(recording.image(row)))
+        if not np.isfinite(raw).all():
+            raise Refusal(f"{where}: the image holds values that are not finite")
+    if has_mask:
+        mask = pinhole.image(recording.mask(row).astype(np.uint8) * np.uint8(255))
+    else:
+        assert raw is not None
+        mask = foreground(raw, where)
+    filled = float((mask > 0.5).mean())
+    if not _LEAST_MASK < filled < _MOST_MASK:
+        raise Refusal(
+            f"{where}: the mask covers {100 * filled:.1f} % of the image: no contour of a robot to align"
+        )
+    if raw is not None:
+        outside = raw[_far_from(mask)]
+        if len(outside):
+            background = np.median(outside, 0)
+            uniform = bool(np.abs(outside - background).mean() < _BACKGROUND_SPREAD)
+    cut = np.zeros((*mask.shape, 4), np.float32)
+    cut[..., 3] = mask
+    if raw is not None:
+        cut[..., :3] = raw if uniform else raw * mask[..., None]
+    reference = np.append(background if uniform else np.zeros(3), 0).astype(np.float32)
+    levels = {
+        level: Level(
+            Renderer(
+                meshes[level],
+                scaled_intrinsics(pinhole.K, level),
+                mask.shape[1] // level,
+                mask.shape[0] // level,
+            ),
+            shrink(cut, level),
+            reference,
+        )
+        for level in LEVELS
+    }
+    full = raw if raw is not None else np.zeros((*mask.shape, 3), np.float32)
+    return View(parent_T_link, levels, full, has_image, uniform)
+
+
+def scaled_intrinsics(K: Array, level: int) -> Array:
+    """K of an image shrunk `level` times, pixel centres at integers before and after."""
+    small = K.copy()
+    small[:2] /= level
+    small[:2, 2] += 0.5 / level - 0.5
+    return small
+
+
+def shrink(picture: Picture, level: int) -> Picture:
+    """Means over squares of `level` pixels of a picture (H, W, C); a rest at the border is left out."""
+    if level == 1:
+        return np.ascontiguousarray(picture)
+    height, width = picture.shape[0] // level, picture.shape[1] // level
+    whole = picture[: height * level, : width * level]
+    return np.asarray(whole.reshape(height, level, width, level, -1).mean((1, 3)), np.float32)
+
+
+def foreground(image: Picture, where: str) -> Picture:
+    """A mask (H, W) in {0, 1} of what differs from a uniform background, found on a smoothed image.
+
+    Raises:
+        Refusal: the border of the image is not uniform, so that only a given mask could tell the robot.
+    """
+    from scipy import ndimage
+
+    border = np.concatenate(
+        [image[:8].reshape(-1, 3), image[-8:].reshape(-1, 3), image[:, :8].reshape(-1, 3)]
+    )
+    background = np.median(border, 0)
+    smooth = ndimage.uniform_filter(image, (5, 5, 1))
+    off = np.abs(smooth - background).max(-1)
+    rim = np.concatenate([off[:8].ravel(), off[-8:].ravel()])
+    if np.percentile(rim, 90) > _BACKGROUND_SPREAD:
+        raise Refusal(f"{where}: no mask, and the background is not uniform: give masks of the robot")
+    threshold = max(0.02, 3 * float(np.median(off) + np.std(rim)))
+    mask = ndimage.binary_opening(ndimage.binary_fill_holes(off > threshold), iterations=2)
+    return np.asarray(mask, np.float32)
+
+
+def _far_from(mask: Picture) -> NDArray[np.bool_]:
+    from scipy import ndimage
+
+    near = ndimage.maximum_filter(shrink(mask[..., None], 4)[..., 0], 9) > 0
+    far = np.zeros(mask.shape, bool)
+    grown = np.repeat(np.repeat(near, 4, 0), 4, 1)
+    far[: grown.shape[0], : grown.shape[1]] = ~grown
+    return far
+
+
+def signed_distance(mask: Picture) -> NDArray[np.float32]:
+    """Distance (h, w) px of pixel centres from the contour of `mask` > 0.5, negative inside."""
+    import cv2
+
+    inside = (mask > 0.5).astype(np.uint8)
+    outward = cv2.distanceTransform(1 - inside, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    inward = cv2.distanceTransform(inside, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    return np.where(inside > 0, 0.5 - inward, outward - 0.5).astype(np.float32)
