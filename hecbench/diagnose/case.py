@@ -36,11 +36,15 @@ class Case:
         recording: as given.
         observe: computes poses; called again where a finding asks what another camera would have given.
         judged: False once the data cannot be fitted, with the reason in a finding.
+        size_factor: by which the declared size of the target is multiplied.
+        explained: ids of samples whose fault has been named.
     """
 
     recording: Recording
     observe: Observe
     judged: bool = True
+    size_factor: float = 1.0
+    explained: frozenset[str] = frozenset()
 
     @cached_property
     def observed(self) -> Recording:
@@ -64,10 +68,12 @@ class Case:
 
     @property
     def camera_T_target(self) -> Array:
-        """(N, 4, 4) m of the usable samples."""
+        """(N, 4, 4) m of the usable samples, for a target of the true size."""
         poses = self.observed.camera_T_target
         assert poses is not None
-        return poses[self.usable]
+        poses = poses[self.usable]
+        poses[:, :3, 3] *= self.size_factor
+        return poses
 
     @property
     def focal_px(self) -> float | None:
@@ -79,7 +85,7 @@ class Case:
     def points_m(self) -> Array:
         """Corners of the rectangle or box around the target."""
         target = self.recording.target
-        return enclosing_points(None if target is None else target.points_m)
+        return self.size_factor * enclosing_points(None if target is None else target.points_m)
 
     @property
     def can_be_fitted(self) -> bool:
@@ -157,15 +163,6 @@ class Case:
         squares = self.agreed[0].disagreement()[0][self.agreed[1]]
         return float(np.sqrt(np.median(squares) / _CHI2_MEDIAN))
 
-    def with_solved_scale(self) -> Case:
-        """The case with robot translations made to fit the declared target."""
-        assert self.solution is not None
-        poses = self.observed.base_T_flange
-        assert poses is not None
-        poses = poses.copy()
-        poses[:, :3, 3] /= self.solution.state.scale
-        return self.with_robot_poses(poses)
-
     def ids(self, chosen: NDArray[np.integer] | NDArray[np.bool_]) -> tuple[str, ...]:
         """Ids of some of the usable samples."""
         return tuple(self.recording.sample_ids[i] for i in self.usable[chosen].tolist())
@@ -177,7 +174,7 @@ class Case:
 
 def disagreement_ratios(found: Fit) -> Array:
     """Squared distances (N,) of the samples from what the others say, relative to the typical sample's."""
-    squares, _ = found.disagreement()
+    squares = found.disagreement()[0]
     return np.asarray(squares / max(float(np.median(squares)), 0.1 * _CHI2_MEDIAN))
 
 

@@ -19,7 +19,7 @@ def examine(case: Case) -> tuple[Finding | None, Case]:
     if not case.can_be_fitted:
         return None, case
     fit = case.fit
-    left = np.inf if fit is None else _relative(case)
+    left = np.inf if fit is None else fit.relative
     if fit is None or left > LIMIT:
         summary = "no calibration explains the poses"
         if fit is not None:
@@ -34,10 +34,3 @@ def examine(case: Case) -> tuple[Finding | None, Case]:
         f"({fit.typical_px:.2g} px) across the view"
     )
     return Finding(ID, Severity.OK, summary, value=left, limit=LIMIT), case
-
-
-def _relative(case: Case) -> float:
-    assert case.fit is not None
-    centres = case.fit.problem.observed.mean(1)
-    moved = float(np.median(np.linalg.norm(centres - np.median(centres, axis=0), axis=1)))
-    return case.fit.typical_px / max(moved, 1e-9)

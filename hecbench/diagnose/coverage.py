@@ -11,7 +11,7 @@ ID = "coverage"
 FEW_SAMPLES = 8
 FLAT = 0.05
 """Smallest over largest extent of the target positions below which they count as coplanar."""
-NARROW = 0.05
+NARROW = 0.03
 """Of the distance: positions closer together than that are seen under nearly the same angle."""
 
 

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
@@ -30,6 +31,7 @@ class Finding:
         value: the number that decides, in the unit that the summary names.
         limit: what it is compared with.
         samples: ids of the samples concerned.
+        per_sample: a number for each sample id, for plots; not part of the JSON.
     """
 
     id: str
@@ -39,6 +41,7 @@ class Finding:
     value: float | None = None
     limit: float | None = None
     samples: tuple[str, ...] = ()
+    per_sample: Mapping[str, float] = field(default_factory=dict)
 
     def to_json(self) -> dict[str, Any]:
         """JSON values by name."""

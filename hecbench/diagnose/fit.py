@@ -25,6 +25,10 @@ Array = NDArray[np.float64]
 TYPICAL_NOISE = Noise(0.5, float(np.deg2rad(0.1)), 1e-3)
 """Of a corner of a good target and of a good arm: px, rad, m."""
 LEAST_SAMPLES = 4
+MUCH_BETTER = 0.35
+"""Ratio of typical residuals below which another reading of the data is the right one."""
+EXPLAINS = 0.15
+"""Of the target's motion in the image; a wrong reading leaves about as much as it moves."""
 _ASSUMED_FOCAL_PX = 1000.0
 _ASSUMED_HALF_WIDTH_M = 0.05
 _WIDE = np.repeat([np.deg2rad(10.0), 0.2], 3) ** -2.0
@@ -62,10 +66,26 @@ class Fit:
         """The median of the samples' residuals."""
         return float(np.median(self.residuals_px))
 
+    @property
+    def relative(self) -> float:
+        """The typical residual over the target's own motion in the image."""
+        centres = self.problem.observed.mean(1)
+        moved = float(np.median(np.linalg.norm(centres - np.median(centres, axis=0), axis=1)))
+        return self.typical_px / max(moved, 1e-9)
+
+    def cures(self, given: Fit | None) -> bool:
+        """Whether this reading of the data explains them, and the given one does much worse."""
+        return self.relative < EXPLAINS and (
+            given is None or self.typical_px < MUCH_BETTER * given.typical_px
+        )
+
     @cached_property
     def camera_T_target(self) -> Array:
         """(N, 4, 4) m as predicted."""
-        hand = hand_poses(self.problem.mounting, self.problem.base_T_flange)
+        return self._predicted(self.problem.base_T_flange)
+
+    def _predicted(self, base_T_flange: Array) -> Array:
+        hand = hand_poses(self.problem.mounting, base_T_flange)
         return np.asarray(se3.inverse(self.state.parent_T_camera) @ hand @ self.state.other_T_target)
 
     def in_mm(self, pixels: float) -> float:
@@ -73,24 +93,27 @@ class Fit:
         depth = float(np.median(self.camera_T_target[:, 2, 3]))
         return 1e3 * pixels * abs(depth) / float(self.problem.sensor.focal_px)  # type: ignore[attr-defined]
 
-    def disagreement(self) -> tuple[Array, Array]:
+    def disagreement(self) -> tuple[Array, Array, Array]:
         """How far each sample is from what the others say.
 
         Returns:
-            Squared Mahalanobis distances (N,) of 6 degrees of freedom under the typical noise, and the change
-            [rad, m] (N, 6) of the robot pose, in its own frame, that would explain what was seen.
+            Squared Mahalanobis distances (N,) of 6 degrees of freedom under the typical noise; and by how many
+            mm (N,) and deg (N,) the target is displaced by the change of the robot pose that would explain
+            what was seen.
         """
         values, _, jacobian = predict(self.problem, self.state)
         columns = slice(6, 12) if self.problem.mounting is Mounting.EYE_TO_HAND else slice(0, 6)
         count = len(values)
         J = jacobian[..., columns].reshape(count, -1, 6) / TYPICAL_NOISE.observed
         r = (values - self.problem.observed).reshape(count, -1) / TYPICAL_NOISE.observed
-        gradient = (np.swapaxes(J, 1, 2) @ r[..., None])[..., 0]
+        gradient = np.swapaxes(J, 1, 2) @ r[..., None]
         information = np.swapaxes(J, 1, 2) @ J
-        solved = np.linalg.solve(information + np.diag(TYPICAL_NOISE.robot_information), gradient[..., None])
-        squares = (r**2).sum(1) - (gradient * solved[..., 0]).sum(1)
-        changes = -np.linalg.solve(information + np.diag(_WIDE), gradient[..., None])[..., 0]
-        return np.asarray(squares), np.asarray(changes)
+        absorbed = np.linalg.solve(information + np.diag(TYPICAL_NOISE.robot_information), gradient)
+        squares = (r**2).sum(1) - (gradient * absorbed).sum((1, 2))
+        changes = -np.linalg.solve(information + np.diag(_WIDE), gradient)[..., 0]
+        explained = self._predicted(self.problem.base_T_flange @ se3.exp(changes))
+        millimetres = 1e3 * se3.translation_error_m(self.camera_T_target, explained)
+        return squares, millimetres, np.rad2deg(np.linalg.norm(changes[:, :3], axis=1))
 
     def subset(self, chosen: NDArray[np.integer] | NDArray[np.bool_]) -> Fit:
         """The same calibration of some of the samples."""

@@ -22,12 +22,13 @@ def examine(case: Case) -> tuple[Finding | None, Case]:
     steps = np.linalg.solve(without, found.gradients[..., None])[:, :6, 0]
     moved_mm = found.displacement_mm(steps)
     worst = int(moved_mm.argmax())
-    concerned = (case.ids(case.agreed[1])[worst],)
+    ids = case.ids(case.agreed[1])
+    concerned, each = (ids[worst],), dict(zip(ids, moved_mm.tolist(), strict=True))
     value, limit = float(moved_mm[worst]), LIMIT * found.expected_mm()
     summary = (
         f"without sample {concerned[0]} the answer moves by {value:.2g} mm in the workspace, the most of all"
     )
     if value > limit:
         action = "record more samples like this one, or look whether it is right"
-        return Finding(ID, Severity.WARNING, summary, action, value, limit, concerned), case
-    return Finding(ID, Severity.OK, summary, value=value, limit=limit, samples=concerned), case
+        return Finding(ID, Severity.WARNING, summary, action, value, limit, concerned, each), case
+    return Finding(ID, Severity.OK, summary, "", value, limit, concerned, each), case

@@ -10,7 +10,7 @@ import numpy as np
 
 from hecbench.diagnose.case import Case
 from hecbench.diagnose.finding import Finding, Severity
-from hecbench.diagnose.fit import Fit
+from hecbench.diagnose.fit import EXPLAINS, Fit
 from hecbench.recording import CameraModel, Recording
 
 ID = "intrinsics"
@@ -18,6 +18,8 @@ OFF_CENTRE = 0.15
 """Of the image's size; lenses are centred to a few per cent."""
 _RATIOS = (0.25, 1 / 3, 0.5, 2 / 3, 0.75, 0.8, 1.25, 4 / 3, 1.5, 2.0, 3.0, 4.0)
 _HALF = 0.5
+_SAME_RATIO = 0.05
+"""Of the relative position of the principal point across and down; a crop seldom keeps both."""
 _SUSPICIOUS_PX = 4.0
 _SUSPICIOUS_SCALE = 0.02
 _BY_SIZE = "use the intrinsics of the resolution the images were taken at, or scale fx, fy, cx, cy"
@@ -45,7 +47,7 @@ def examine(case: Case) -> tuple[Finding | None, Case]:
     )
     if suspicious and case.recording.corners_px is not None and case.can_be_fitted:
         best = min(_rescaled_fits(case, camera), key=lambda found: found[0], default=None)
-        if best is not None and best[0] < _HALF * _angle(fit, camera.K[0, 0]):
+        if best is not None and best[2].relative < EXPLAINS and best[0] < _HALF * _angle(fit, camera.K[0, 0]):
             ratio, better = best[1], best[2]
             summary = (
                 f"the intrinsics are of another resolution: times {ratio:.3g} the typical sample fits to "
@@ -56,10 +58,17 @@ def examine(case: Case) -> tuple[Finding | None, Case]:
         summary = f"{outside} corners lie outside the {camera.width}x{camera.height} image"
         return Finding(ID, Severity.CRITICAL, summary, _BY_SIZE, float(outside), 0.0), case
     summary = f"the principal point is {100 * offset:.0f} % of the image's size from its centre"
-    if offset > OFF_CENTRE:
-        action = f"{_BY_SIZE}; for a cropped image this may be right"
-        return Finding(ID, Severity.WARNING, summary, action, offset, OFF_CENTRE), case
-    return Finding(ID, Severity.OK, summary, value=offset, limit=OFF_CENTRE), case
+    if offset <= OFF_CENTRE:
+        return Finding(ID, Severity.OK, summary, value=offset, limit=OFF_CENTRE), case
+    across, down = camera.K[:2, 2] / [camera.width, camera.height]
+    if abs(across - down) < _SAME_RATIO:
+        ratio = 1 / (across + down)
+        summary += f", as for images of {1 / ratio:.3g} times this size"
+        return Finding(ID, Severity.CRITICAL, summary, _BY_SIZE, offset, OFF_CENTRE), _cured(
+            case, camera, ratio
+        )
+    action = f"{_BY_SIZE}; for a cropped image this may be right"
+    return Finding(ID, Severity.WARNING, summary, action, offset, OFF_CENTRE), case
 
 
 def _image_size(recording: Recording) -> tuple[int, int] | None:
@@ -94,9 +103,7 @@ def _scaled(camera: CameraModel, ratio: float) -> CameraModel:
 def _cured(case: Case, camera: CameraModel, ratio: float) -> Case:
     if camera.K is None:
         return case
-    width, height = round(camera.width * ratio), round(camera.height * ratio)
-    scaled = replace(_scaled(camera, ratio), width=width, height=height)
-    return replace(case, recording=replace(case.recording, camera=scaled))
+    return replace(case, recording=replace(case.recording, camera=_scaled(camera, ratio)))
 
 
 def _rescaled_fits(case: Case, camera: CameraModel) -> Iterator[tuple[float, float, Fit]]:

@@ -9,22 +9,23 @@ from numpy.typing import NDArray
 
 from hecbench.diagnose.case import STANDS_OUT, Case
 from hecbench.diagnose.finding import Finding, Severity, names
-from hecbench.diagnose.fit import LEAST_SAMPLES
-from hecbench.diagnose.pose_direction_or_mounting import MUCH_BETTER
+from hecbench.diagnose.fit import LEAST_SAMPLES, MUCH_BETTER
 
 ID = "pairing"
 _SHIFTS = (1, -1)
+_FITS = 2 * STANDS_OUT
+_FAR_BETTER = 0.1
 
 
 def examine(case: Case) -> tuple[Finding | None, Case]:
     """Residuals with the robot poses shifted by one sample; then exchanges among the samples that disagree."""
-    if case.fit is None or len(case.usable) <= LEAST_SAMPLES:
+    if not case.can_be_fitted or len(case.usable) <= LEAST_SAMPLES:
         return None, case
-    as_given = case.fit.typical_px
+    as_given = np.inf if case.fit is None else case.fit.typical_px
     for shift in _SHIFTS:
         target, robot = _shifted(len(case.usable), shift)
         moved = case.fit_of(case.base_T_flange[robot], case.camera_T_target[target])
-        if moved is not None and moved.typical_px < MUCH_BETTER * as_given:
+        if moved is not None and moved.cures(case.fit):
             which = "next" if shift > 0 else "previous"
             summary = (
                 f"every image belongs to the robot pose of the {which} sample: the typical sample then fits to "
@@ -60,7 +61,7 @@ def _exchanged(case: Case) -> list[tuple[int, int]]:
         return []
     found, agreeing = case.agreed
     odd = np.flatnonzero(~agreeing)
-    squares, _ = found.disagreement()
+    squares = found.disagreement()[0]
     typical = float(np.median(squares))
     pairs: list[tuple[int, int]] = []
     taken: set[int] = set()
@@ -69,7 +70,7 @@ def _exchanged(case: Case) -> list[tuple[int, int]]:
             if {a, b} & taken:
                 continue
             crossed = found.with_robot_poses(case.base_T_flange[[b, a]], np.array([a, b])).disagreement()[0]
-            if (crossed <= STANDS_OUT * typical).all():
+            if (crossed <= _FITS * typical).all() and (crossed < _FAR_BETTER * squares[[a, b]]).all():
                 pairs.append((a, b))
                 taken |= {a, b}
     return pairs

@@ -11,10 +11,9 @@ import numpy as np
 from hecbench import se3
 from hecbench.diagnose.case import Case, inverted, other
 from hecbench.diagnose.finding import Finding, Severity
+from hecbench.diagnose.fit import MUCH_BETTER
 
 ID = "pose_direction_or_mounting"
-MUCH_BETTER = 0.35
-"""Ratio of residuals below which the other reading is the right one."""
 _AGREES_DEG = 10.0
 
 
@@ -24,7 +23,7 @@ def examine(case: Case) -> tuple[Finding | None, Case]:
         return None, case
     turned = case.with_robot_poses(inverted(case.observed.base_T_flange))
     as_declared = np.inf if case.fit is None else case.fit.typical_px
-    if turned.fit is None or turned.fit.typical_px > MUCH_BETTER * as_declared:
+    if turned.fit is None or not turned.fit.cures(case.fit):
         if case.fit is None:
             return None, case
         summary = f"as declared the typical sample fits to {as_declared:.2g} px"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,6 +18,9 @@ ID = "sample_moving"
 LIMIT_MM = 2.0
 LIMIT_DEG = 0.2
 LIMIT_LAG_S = 0.05
+FARTHEST_MM = 150.0
+FARTHEST_DEG = 15.0
+"""Joints and pose farther apart are of other samples, not of other moments."""
 _TIMES_TYPICAL = 6.0
 _CURE = "wait until the arm stands still before taking image and pose, and record these samples again"
 
@@ -25,7 +30,7 @@ def examine(case: Case) -> tuple[Finding | None, Case]:
     finding = _by_joints(case) or _by_stamps(case)
     if finding is None:
         return None, case
-    return finding, case
+    return finding, replace(case, explained=case.explained | frozenset(finding.samples))
 
 
 def _by_joints(case: Case) -> Finding | None:
@@ -36,6 +41,7 @@ def _by_joints(case: Case) -> Finding | None:
     off = (found.millimetres > max(LIMIT_MM, _TIMES_TYPICAL * typical_mm)) | (
         found.degrees > max(LIMIT_DEG, _TIMES_TYPICAL * typical_deg)
     )
+    off &= (found.millimetres < FARTHEST_MM) & (found.degrees < FARTHEST_DEG)
     if not off.any():
         return None
     concerned = tuple(case.recording.sample_ids[i] for i in found.indices[off].tolist())

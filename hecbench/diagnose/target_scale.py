@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from hecbench.diagnose.case import Case
@@ -23,7 +25,9 @@ def examine(case: Case) -> tuple[Finding | None, Case]:
     summary = f"the robot's motion says that the target is {scale:.4f} +- {sigma:.4f} of the declared size"
     action = f"measure the printed target with a ruler: {scale:.3f} of the declared size is expected"
     if deviation > LIMIT and deviation > _SIGMAS * sigma:
-        return Finding(ID, Severity.CRITICAL, summary, action, scale, LIMIT), case.with_solved_scale()
+        return Finding(ID, Severity.CRITICAL, summary, action, scale, LIMIT), replace(
+            case, size_factor=case.size_factor * scale
+        )
     if deviation > NOTICEABLE and deviation > _SIGMAS * sigma:
         return Finding(ID, Severity.WARNING, summary, action, scale, LIMIT), case
     return Finding(ID, Severity.OK, summary, value=scale, limit=LIMIT), case

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from hecbench.diagnose.case import Case
@@ -38,7 +40,7 @@ def examine(case: Case) -> tuple[Finding | None, Case]:
             what = f"camera_T_target is in {name}, not in metres"
         summary = f"{what}: {motion}" if motion else what
         action = f"divide the size of the target, or the translations of camera_T_target, by {factor:g}"
-        return _critical(summary, action, size_m or factor, LARGEST_TARGET_M), _rescaled_robot(
+        return _critical(summary, action, size_m or factor, LARGEST_TARGET_M), _resized_target(
             case, 1 / factor
         )
     if unit:
@@ -46,7 +48,7 @@ def examine(case: Case) -> tuple[Finding | None, Case]:
         action = (
             f"give the target's size in metres (it looks {unit[0]:g} times too small), or the robot poses"
         )
-        return _critical(summary, action, unit[0], _NEAR), _rescaled_robot(case, unit[0])
+        return _critical(summary, action, unit[0], _NEAR), _resized_target(case, unit[0])
     return Finding(
         ID, Severity.OK, f"the flange stays within {reach_m:.2g} m", value=reach_m, limit=REACH_M
     ), case
@@ -66,9 +68,14 @@ def _unit(scale: float) -> tuple[float, str] | None:
 
 
 def _rescaled_robot(case: Case, factor: float) -> Case:
-    """The case with robot translations divided, which fits them to the target whichever of the two is wrong."""
+    """The case with robot translations divided."""
     poses = case.observed.base_T_flange
     assert poses is not None
     poses = poses.copy()
     poses[:, :3, 3] /= factor
     return case.with_robot_poses(poses)
+
+
+def _resized_target(case: Case, factor: float) -> Case:
+    """The case with the target's size multiplied."""
+    return replace(case, size_factor=case.size_factor * factor)
