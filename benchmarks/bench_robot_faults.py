@@ -1,33 +1,29 @@
 """A thousand random faults: every one ends in a named state in time, leaves no process and no torn file.
 
-Run: ``.venv/bin/python benchmarks/bench_robot_faults.py [COUNT] [SEED]``.
+Run: ``make bench TEST_ARGS=benchmarks/bench_robot_faults.py`` (a quarter of an hour).
 """
 
-import sys
-import tempfile
 from collections import Counter
-from pathlib import Path
 
 import numpy as np
 from hecbench_hardware import campaign
 
+FAULTS, SEED = 1000, 1
 
-def main(count=1000, seed=1):
-    states, faults, late_s, bad = Counter(), Counter(), [], 0
-    with tempfile.TemporaryDirectory() as folder:
-        for outcome in campaign.run(count, seed, Path(folder)):
-            states[outcome.state] += 1
-            faults[outcome.fault.split()[0]] += 1
-            late_s.append(outcome.elapsed_s - outcome.allowed_s + campaign.PAST_EXPECTED_S)
+
+def test_fault_campaign(benchmark, tmp_path):
+    def run():
+        for outcome in campaign.run(FAULTS, SEED, tmp_path):
             if not outcome.fine:
-                bad += 1
                 print(outcome, flush=True)
-    print(f"{count} faults, {bad} ended badly")
-    print("injected:", dict(faults.most_common()))
-    print("ended as:", dict(states.most_common()))
-    print(f"past the expected time: median {np.median(late_s):.2f} s, worst {max(late_s):.2f} s")
-    return bad
+            outcomes.append(outcome)
 
-
-if __name__ == "__main__":
-    sys.exit(1 if main(*map(int, sys.argv[1:])) else 0)
+    outcomes = []
+    benchmark.pedantic(run, rounds=1)
+    past_s = [o.elapsed_s - o.allowed_s + campaign.PAST_EXPECTED_S for o in outcomes]
+    print("\ninjected:", dict(Counter(outcome.fault for outcome in outcomes).most_common()))
+    print("during:", dict(Counter(outcome.work for outcome in outcomes).most_common()))
+    print("ended as:", dict(Counter(outcome.state for outcome in outcomes).most_common()))
+    print(f"past the expected time: median {np.median(past_s):.2f} s, worst {max(past_s):.2f} s")
+    assert len(outcomes) == FAULTS
+    assert all(outcome.fine for outcome in outcomes)

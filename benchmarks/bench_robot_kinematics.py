@@ -1,6 +1,6 @@
 """Analytic inverse kinematics against the forward kinematics: 10,000 poses per arm, all branches, <= 1e-9 m.
 
-Run: ``.venv/bin/python -m pytest benchmarks/bench_robot_kinematics.py -p no:xdist --benchmark-only -s``.
+Run: ``make bench TEST_ARGS=benchmarks/bench_robot_kinematics.py``.
 """
 
 from math import pi

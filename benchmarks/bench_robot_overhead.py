@@ -1,13 +1,13 @@
-"""The driver against ur_rtde called directly, on one simulated controller in real time: cost per command.
+"""The driver against ur_rtde called directly, on simulated controllers in real time: at most 1 ms per command.
 
-Rounds alternate between the two, so that a busy machine slows both. Run:
-``.venv/bin/python benchmarks/bench_robot_overhead.py [ROUNDS]``.
+The two take turns, so that a busy machine slows both alike. Run:
+``make bench TEST_ARGS=benchmarks/bench_robot_overhead.py``.
 """
 
-import sys
 import time
 
 import numpy as np
+import pytest
 import rtde_control
 import rtde_receive
 from hecbench_hardware.controller_sim.process import SimulatedController
@@ -16,9 +16,31 @@ from hecbench_hardware.ur.robot import UrRobot
 from hecbench_hardware.ur.stream import Supervision
 
 HOME = [0.0, -1.5707963, 1.5707963, -1.5707963, -1.5707963, 0.0]
+ROUNDS = 500
+
+
+@pytest.fixture(scope="module")
+def client():
+    with SimulatedController() as controller:
+        direct = rtde_control.RTDEControlInterface(controller.host)
+        direct.moveJ(HOME)
+        yield direct
+        direct.disconnect()
+
+
+@pytest.fixture(scope="module")
+def robot():
+    with (
+        SimulatedController() as controller,
+        UrRobot(controller.host, ARMS["ur5e"], supervision=Supervision(max_age_s=2.0)) as driven,
+    ):
+        driven.enable()
+        driven.move_joints(HOME)
+        yield driven
 
 
 def direct_move(client):
+    """What the driver does, with nothing around it: start, then poll each millisecond."""
     before = client.getAsyncOperationProgressEx().operationId()
     client.moveJ(HOME, 0.5, 1.0, True)
     while True:
@@ -34,42 +56,35 @@ def seconds(action):
     return time.perf_counter() - began
 
 
-def stream_rate_hz(host, duration_s=2.0):
-    """Samples with a new controller clock per second at 500 Hz."""
-    client, stamps = rtde_receive.RTDEReceiveInterface(host, 500.0), set()
-    began = time.perf_counter()
-    while time.perf_counter() - began < duration_s:
-        stamps.add(client.getTimestamp())
-        time.sleep(2e-4)
-    client.disconnect()
-    return len(stamps) / duration_s
+@pytest.mark.parametrize("command", ["question", "motion"])
+def test_overhead_per_command(benchmark, client, robot, command):
+    direct, driven = {
+        "question": (client.getTCPOffset, lambda: robot._request("call", "getTCPOffset")),
+        "motion": (lambda: direct_move(client), lambda: robot.move_joints(HOME)),
+    }[command]
+    times_ms = []
+    benchmark.pedantic(lambda: times_ms.append((seconds(direct), seconds(driven))), rounds=ROUNDS)
+    alone_ms, with_driver_ms = 1e3 * np.median(times_ms, axis=0)
+    print(f"\n{command}: direct {alone_ms:.2f} ms, driver {with_driver_ms:.2f} ms (medians of {ROUNDS})")
+    assert with_driver_ms - alone_ms <= 1.0
 
 
-def main(rounds=300):
-    with SimulatedController() as one, SimulatedController() as other:
-        print(f"stream: {stream_rate_hz(one.host):.0f} Hz of 500 Hz")
-        client = rtde_control.RTDEControlInterface(one.host)
-        robot = UrRobot(other.host, ARMS["ur5e"], supervision=Supervision(max_age_s=2.0))
-        robot.enable()
-        client.moveJ(HOME)
-        robot.move_joints(HOME)
-        pairs = {
-            "question (getTCPOffset)": (client.getTCPOffset, lambda: robot._request("call", "getTCPOffset")),
-            "motion of length 0": (lambda: direct_move(client), lambda: robot.move_joints(HOME)),
-        }
-        for name, (direct, driven) in pairs.items():
-            times_ms = 1e3 * np.array([(seconds(direct), seconds(driven)) for _ in range(rounds)])
-            plain, ours = np.median(times_ms, axis=0)
-            low, high = np.percentile(times_ms[:, 1] - times_ms[:, 0], (25, 75))
-            print(
-                f"{name}: direct {plain:.2f} ms, driver {ours:.2f} ms, median overhead {ours - plain:.2f} ms"
-            )
-            print(f"  quartiles of the paired difference: {low:.2f} to {high:.2f} ms")
-        state_us = 1e6 * np.median([seconds(robot.state) for _ in range(rounds)])
-        print(f"state(): {state_us:.0f} us")
-        robot.close()
-        client.disconnect()
+def test_reading_the_state(benchmark, robot):
+    benchmark(robot.state)
 
 
-if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+def test_stream_rate(benchmark):
+    """Samples with a new controller clock per second; the controller offers 500."""
+    stamps, duration_s = set(), 4.0
+
+    def listen():
+        end = time.perf_counter() + duration_s
+        while time.perf_counter() < end:
+            stamps.add(receive.getTimestamp())
+            time.sleep(2e-4)
+
+    with SimulatedController() as controller:
+        receive = rtde_receive.RTDEReceiveInterface(controller.host, 500.0)
+        benchmark.pedantic(listen, rounds=1)
+        receive.disconnect()
+    print(f"\nstream: {len(stamps) / duration_s:.0f} Hz")
