@@ -83,6 +83,8 @@ def record(
     from hecbench_hardware.arming import take_control
     from hecbench_hardware.recorder.record import Recorder
 
+    if freedrive and (poses is not None or dry_run):
+        raise InputError("--freedrive has no plan: leave --poses and --dry-run out")
     plan = recording_io.load(cell)
     given = _settings(settings)
     extra = {"host": host, "limits": None if limits is None else str(limits)}

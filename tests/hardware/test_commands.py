@@ -90,6 +90,7 @@ def test_freedrive_on_a_simulated_arm(invoke, cell, tmp_path):
         (("--set", "robot.colour=red"), "no option colour"),
         (("--robot", "sim_ur10e"), "was made for a ur5e"),
         (("--robot", "ur5e"), "host="),
+        (("--freedrive", "--dry-run"), "--freedrive has no plan"),
     ],
 )
 def test_wrong_words_are_one_line(invoke, cell, tmp_path, words, complaint):

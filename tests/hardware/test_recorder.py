@@ -84,6 +84,7 @@ def test_drive_writes_a_recording_that_loads(robot, camera, plan, tmp_path):
     assert recording.base_T_flange == pytest.approx(ARM.forward(plan.joints_rad), abs=1e-9)
     assert np.abs(recording.robot_stamp_s - recording.camera_stamp_s).max() < 2
     assert recording.image(1)[0, 0, 0] == 25, "the mean of the frames 20 and 30"
+    assert recording.robot.model == "ur5e"
     assert recording.robot.joint_names[0] == "shoulder_pan_joint"
     diary = [json.loads(line) for line in (out / FILE_NAME).read_text().splitlines()]
     assert diary[0]["robot"]["serial_number"].isdigit()

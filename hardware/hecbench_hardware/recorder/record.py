@@ -121,7 +121,7 @@ class Recorder:
             raise InputError(f"{self.folder}: no sample was recorded; hold the arm still and try again")
         lines = [recorded[name] for name in ids]
         with_images = all(line.image for line in lines)
-        description = self.cell.robot or RobotDescription()
+        description = self.cell.robot or RobotDescription(model=self.robot.arm.name)
         recording = replace(
             self.cell,
             name=self.folder.resolve().name,

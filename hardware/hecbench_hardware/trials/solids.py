@@ -16,7 +16,7 @@ from hecbench.targets import AprilTagTarget
 
 Vector = tuple[float, float, float]
 
-_WALL_PIECES = 48
+_WALL_PIECES = 32
 _PLATE_TILT_RAD = np.pi / 4
 
 

@@ -17,8 +17,8 @@ from hecbench_hardware.trials import solids
 from hecbench_hardware.trials.solids import Box, Gripper, Solid
 from hecbench_hardware.trials.tasks import Task, Verdict, final_tolerances_mm, verdict
 
-_STEP_M = 0.003
-_NEAR_M = 0.03
+_STEP_M = 0.005
+_NEAR_M = {Task.GRASP: 0.03, Task.INSERTION: 0.006}
 """Distances up to this are measured; beyond it the margin is this."""
 
 
@@ -53,12 +53,12 @@ class _Sweep:
     def __init__(self, task: Task, gripper: Gripper, clearance_m: float) -> None:
         import mujoco
 
-        self.task, self.gripper = task, gripper
+        self.task, self.gripper, self.near_m = task, gripper, _NEAR_M[task]
         spec = mujoco.MjSpec()
         table = spec.worldbody.add_geom(name="table", type=mujoco.mjtGeom.mjGEOM_PLANE, size=[1, 1, 1])
-        table.margin = _NEAR_M
+        table.margin = self.near_m
         for solid in solids.workpiece(clearance_m):
-            add_solid(spec.worldbody, solid, margin=_NEAR_M)
+            add_solid(spec.worldbody, solid, margin=self.near_m)
         body = spec.worldbody.add_body(name="tool")
         body.add_freejoint()  # bodies that cannot move are not tested against each other
         moving = (*gripper.solids(), *((solids.peg(),) if task is Task.INSERTION else ()))
@@ -86,7 +86,7 @@ class _Sweep:
 
         model, data = self.model, self.data
         quaternions = se3.to_quat_wxyz(path)
-        nearest, pair, where = _NEAR_M, ("", ""), 0.0
+        nearest, pair, where = self.near_m, ("", ""), 0.0
         for step, (pose, quaternion) in enumerate(zip(path, quaternions, strict=True)):
             data.qpos[:3], data.qpos[3:] = pose[:3, 3], quaternion
             mujoco.mj_kinematics(model, data)
