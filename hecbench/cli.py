@@ -359,14 +359,15 @@ def _prepared(recording: Recording, views: int | None, init: Path | None, seed: 
 
 
 def _specs(names: Sequence[str], recording: Recording) -> list[SolverSpec]:
-    """The named solvers, or all ready ones whose needs the recording meets."""
-    from hecbench import registry
+    """The named solvers, or all ready ones whose needs the recording will meet."""
+    from hecbench import registry, runner
     from hecbench.specs import Kind, SolverSpec
 
     known = registry.load()
     if names:
         return [known.get(Kind.SOLVER, name, SolverSpec) for name in dict.fromkeys(names)]
-    return [spec for spec in known.ready(Kind.SOLVER, SolverSpec) if spec.needs <= recording.offers()]
+    offers = runner.will_offer(recording)
+    return [spec for spec in known.ready(Kind.SOLVER, SolverSpec) if spec.needs <= offers]
 
 
 def _tasks(

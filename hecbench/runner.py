@@ -14,12 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from hecbench import __version__, registry, store
+from hecbench import __version__, diagnose, evidence, registry, store
 from hecbench.errors import HecbenchError, InputError, Refusal, SolverFailure
 from hecbench.estimate import Estimate, Status, Termination
+from hecbench.evidence import Evidence
 from hecbench.recording import Recording
 from hecbench.robot import load_robot
-from hecbench.specs import DatasetSpec, EvaluatorSpec, Kind, Need, ObserverSpec, SolverSpec, SuiteSpec
+from hecbench.specs import DatasetSpec, EvaluatorSpec, Into, Kind, Need, ObserverSpec, SolverSpec, SuiteSpec
 
 _OBSERVED = (Need.CORNERS, Need.TARGET_POSES)
 _HOW_TO_GIVE = {
@@ -86,6 +87,16 @@ def prepare(recording: Recording) -> Recording:
     return recording
 
 
+def will_offer(recording: Recording) -> frozenset[Need]:
+    """What the recording will offer once it is prepared, found without preparing it."""
+    offers = recording.offers()
+    observers = registry.load().ready(Kind.OBSERVER, ObserverSpec)
+    given = {observer.gives for observer in observers if observer.applies(recording)}
+    if Need.CORNERS in given:  # detection calibrates an unknown camera
+        given |= {Need.INTRINSICS, Need.TARGET_POSES}
+    return offers | given
+
+
 def with_robot_poses(recording: Recording) -> Recording:
     """Fill a missing base_T_flange from the joints by the robot model's forward kinematics, where both are
     known.
@@ -108,12 +119,12 @@ def solve(recording: Recording, specs: Iterable[SolverSpec], options: Options = 
     origin = _provenance(recording, options)
     recording = prepare(recording)
     blind = recording.without_truth()
-    estimates = []
-    for spec in specs:
-        answer = _solve_blind(blind, spec, options)
-        errors, held_out = _measure(answer, recording, blind, spec, options)
-        estimates.append(replace(answer, errors=errors, held_out=held_out, provenance=origin))
-    return estimates
+    return [
+        replace(
+            _measured(_solve_blind(blind, spec, options), recording, blind, spec, options), provenance=origin
+        )
+        for spec in specs
+    ]
 
 
 def _provenance(recording: Recording, options: Options) -> dict[str, Any]:
@@ -174,24 +185,30 @@ def _labelled(estimate: Estimate, blind: Recording, spec: SolverSpec, seconds: f
     )
 
 
-def _measure(
+def _measured(
     estimate: Estimate, recording: Recording, blind: Recording, spec: SolverSpec, options: Options
-) -> tuple[dict[str, Any] | None, dict[str, Any] | None]:
-    """The errors against the truth and the held-out residuals, None where not asked for or not possible."""
+) -> Estimate:
+    """The estimate with what every ruler that applies says about it."""
+    if estimate.status is not Status.OK:
+        return estimate
     has_truth = recording.truth_parent_T_camera is not None
     wants_folds = options.held_out if options.held_out is not None else not (has_truth or spec.slow)
-    measured: dict[bool, dict[str, Any]] = {True: {}, False: {}}
+    wanted = {Into.ERRORS: has_truth, Into.HELD_OUT: wants_folds, Into.DIAGNOSTICS: True}
+    measured: dict[Into, dict[str, Any]] = {part: {} for part in Into}
     for evaluator in registry.load().ready(Kind.EVALUATOR, EvaluatorSpec):
-        if estimate.status is not Status.OK or not evaluator.applies(recording):
-            continue
-        if evaluator.reads_truth or wants_folds:
-            measured[evaluator.reads_truth] |= evaluator.factory()(
+        if wanted[evaluator.into] and evaluator.applies(recording):
+            measured[evaluator.into] |= evaluator.factory()(
                 estimate,
-                recording if evaluator.reads_truth else blind,
+                recording if evaluator.into is Into.ERRORS else blind,
                 solve=lambda part: _solve_blind(part, spec, options),
                 rng=np.random.default_rng([options.seed, zlib.crc32(evaluator.name.encode())]),
             )
-    return measured[True] or None, measured[False] or None
+    return replace(
+        estimate,
+        errors=measured[Into.ERRORS] or None,
+        held_out=measured[Into.HELD_OUT] or None,
+        diagnostics=measured[Into.DIAGNOSTICS] | dict(estimate.diagnostics),
+    )
 
 
 @cache
@@ -226,11 +243,24 @@ class Task:
         return str(self.path) if self.path is not None else f"{self.index:06d}"
 
 
-def execute(task: Task, options: Options) -> list[Estimate]:
-    """Run one task; the unit of parallel work."""
+def execute(task: Task, options: Options) -> tuple[list[Estimate], Evidence | None]:
+    """Run one task, the unit of parallel work; a recording from disk is examined too, for the report."""
     specs = [registry.load().get(Kind.SOLVER, name, SolverSpec) for name in task.solvers]
-    estimates = solve(task.recording(options.seed), specs, options)
-    return [replace(e, suite=task.suite or "files", level=task.level, item=task.item) for e in estimates]
+    recording = task.recording(options.seed)
+    estimates = [
+        replace(estimate, suite=task.suite or "files", level=task.level, item=task.item)
+        for estimate in solve(recording, specs, options)
+    ]
+    return estimates, None if task.path is None else _examined(recording)
+
+
+def _examined(recording: Recording) -> Evidence:
+    findings = diagnose.check(recording, prepare)
+    influence = next((dict(f.per_sample) for f in findings if f.id == "influence"), {})
+    influence_mm = np.array([influence.get(sample, np.nan) for sample in recording.sample_ids])
+    return evidence.collect(
+        prepare(recording), recording.sha256, [f.to_json() for f in findings], influence_mm
+    )
 
 
 def remaining(tasks: Iterable[Task], done: Iterable[Estimate], options: Options) -> list[Task]:
@@ -266,13 +296,17 @@ def run(
     """
     with store.writing(out, resume=resume) as writer:
         done = store.read(out).estimates
-        for estimates in _executed(remaining(tasks, done, options), options, jobs):
+        for estimates, found in _executed(remaining(tasks, done, options), options, jobs):
+            if found is not None:
+                evidence.save(found, out)
             writer.append(estimates)
             on_result(estimates)
     return store.read(out)
 
 
-def _executed(tasks: Sequence[Task], options: Options, jobs: int) -> Iterator[list[Estimate]]:
+def _executed(
+    tasks: Sequence[Task], options: Options, jobs: int
+) -> Iterator[tuple[list[Estimate], Evidence | None]]:
     if jobs == 1 or len(tasks) < 2:
         yield from (execute(task, options) for task in tasks)
         return

@@ -128,14 +128,25 @@ class Evaluator(Protocol):
     ) -> Mapping[str, Any]: ...
 
 
+class Into(StrEnum):
+    """Where a ruler's numbers go, and when it is applied."""
+
+    ERRORS = "errors"
+    """It reads the truth, and is applied where there is one."""
+    HELD_OUT = "held_out"
+    """It solves again on folds, and is applied without truth or when asked for."""
+    DIAGNOSTICS = "diagnostics"
+    """It only needs the estimate and its recording, and is always applied."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class EvaluatorSpec(Spec):
-    """A ruler. Its columns go to `estimate.errors` when it reads the truth, else to `estimate.held_out`."""
+    """A ruler; its columns go into the part of the estimate that `into` names."""
 
     kind: ClassVar[Kind] = Kind.EVALUATOR
     columns: tuple[Column, ...]
     factory: Callable[[], Evaluator]
-    reads_truth: bool
+    into: Into
     applies: Callable[[Recording], bool]
 
 

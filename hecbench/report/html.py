@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from hecbench import files, store
-from hecbench.estimate import Estimate
+from hecbench import evidence, files, store
+from hecbench.errors import InputError
+from hecbench.estimate import Estimate, best_first
+from hecbench.evidence import Evidence
 from hecbench.report.figures import figures
-from hecbench.report.tables import groups, table
+from hecbench.report.recording_figures import agreement_figure, overlays, residual_figure, scene_figure
+from hecbench.report.tables import Group, groups, table
 
 FILE_NAME = "report.html"
 
@@ -23,27 +26,35 @@ def write(folder: Path) -> tuple[Path, store.Contents]:
     Raises:
         InputError: the folder holds no store, or no whole result.
     """
-    from hecbench.errors import InputError
-
     contents = store.read(folder)
     if not contents.estimates:
         raise InputError(f"{folder}: its store holds no whole result; run again with `hecbench run --resume`")
     path = folder / FILE_NAME
-    files.write_text(path, page(contents.estimates, contents.damage, f"hecbench report {folder}"))
+    files.write_text(
+        path,
+        page(
+            contents.estimates,
+            contents.damage,
+            f"hecbench report {folder}",
+            lambda sha256: evidence.load(folder, sha256),
+        ),
+    )
     return path, contents
 
 
-def page(estimates: Sequence[Estimate], damage: Sequence[str], command: str) -> str:
-    """The HTML text of a report on these estimates."""
+def page(
+    estimates: Sequence[Estimate],
+    damage: Sequence[str],
+    command: str,
+    evidence: Callable[[str], Evidence | None],
+) -> str:
+    """The HTML text of a report on these estimates; `evidence` gives what a run kept of a recording, by hash."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
         loader=PackageLoader("hecbench.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
-    sections = [
-        {"table": table(group), "figures": figures(group), "commands": _values(group.estimates, "command")}
-        for group in groups(estimates)
-    ]
+    sections = [_section(group, evidence) for group in groups(estimates)]
     return environment.get_template("report.html.j2").render(
         sections=sections,
         damage=damage,
@@ -55,6 +66,26 @@ def page(estimates: Sequence[Estimate], damage: Sequence[str], command: str) -> 
         versions=_values(estimates, "hecbench"),
         libraries=_values(estimates, "versions"),
     )
+
+
+def _section(group: Group, evidence: Callable[[str], Evidence | None]) -> dict[str, Any]:
+    """What the page shows of one level or recording."""
+    section: dict[str, Any] = {
+        "table": table(group),
+        "figures": figures(group),
+        "commands": _values(group.estimates, "command"),
+        "findings": [],
+        "overlays": [],
+    }
+    shown = None if group.is_level else evidence(str(group.estimates[0].provenance.get("recording_sha256")))
+    if shown is not None:
+        ordered = best_first(group.estimates)
+        best = ordered[0]
+        drawn = (scene_figure(shown, best), residual_figure(shown, best), agreement_figure(shown, ordered))
+        section["figures"] += [figure for figure in drawn if figure is not None]
+        section["findings"] = shown.findings
+        section["overlays"] = overlays(shown, best)
+    return section
 
 
 def _values(estimates: Sequence[Estimate], name: str) -> list[str]:

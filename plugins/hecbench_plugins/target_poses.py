@@ -36,7 +36,7 @@ def target_poses(recording: Recording) -> Array:
     if not seen.any():
         raise Refusal(f"no sample shows {MINIMUM_POINTS} or more target points")
     choice = np.zeros(len(recording), int)
-    if recording.base_T_flange is not None:
+    if recording.base_T_flange is not None and recording.corners_px is not None:
         hand = recording.hand_poses()
         decidable = seen & np.isfinite(hand).all((1, 2))
         points = np.isfinite(recording.corners_px).all(-1).sum(-1)

@@ -12,7 +12,7 @@ from hecbench import se3, statistics
 from hecbench.estimate import Estimate, Status
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
-from hecbench.specs import Column, EvaluatorSpec, Need
+from hecbench.specs import Column, EvaluatorSpec, Into, Need
 from hecbench_plugins.target_poses import project
 
 Array = NDArray[np.float64]
@@ -118,7 +118,7 @@ def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
         summary="prediction of left-out samples",
         columns=_COLUMNS,
         factory=lambda: held_out,
-        reads_truth=False,
+        into=Into.HELD_OUT,
         applies=lambda recording: (
             recording.camera_T_target is not None and recording.base_T_flange is not None
         ),

@@ -11,7 +11,7 @@ from hecbench import se3
 from hecbench.estimate import Estimate
 from hecbench.recording import Mounting, Recording
 from hecbench.registry import hookimpl
-from hecbench.specs import Column, EvaluatorSpec
+from hecbench.specs import Column, EvaluatorSpec, Into
 
 Array = NDArray[np.float64]
 
@@ -71,6 +71,6 @@ def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
             Column("tre_mm", "mm"),
         ),
         factory=lambda: errors,
-        reads_truth=True,
+        into=Into.ERRORS,
         applies=lambda recording: recording.truth_parent_T_camera is not None,
     )
