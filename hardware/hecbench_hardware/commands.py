@@ -177,6 +177,8 @@ def _print(recording: Recording, out: Path, as_json: bool) -> None:
     from hecbench.diagnose import Severity, check
     from hecbench.runner import prepare
 
+    if not as_json:
+        click.echo(f"{out}: {len(recording)} samples")
     findings = check(recording, prepare)
     if as_json:
         answer = {
@@ -186,7 +188,6 @@ def _print(recording: Recording, out: Path, as_json: bool) -> None:
         }
         click.echo(msgspec.json.format(msgspec.json.encode(answer), indent=1))
     else:
-        click.echo(f"{out}: {len(recording)} samples")
         for finding in findings:
             if finding.severity is not Severity.OK:
                 click.echo(f"{finding.severity}: {finding.summary}; {finding.action}".rstrip("; "))

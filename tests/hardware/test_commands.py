@@ -17,7 +17,7 @@ from PIL import Image
 from hecbench import recording_io, se3
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
-from hecbench.targets import AprilTagTarget
+from hecbench.targets import PointsTarget
 
 FAST = ("--set", "robot.time_scale=50", "--set", "robot.max_age_s=1")
 
@@ -31,7 +31,7 @@ def cell(tmp_path, ready_pose):
         sample_ids=("0", "1"),
         robot=RobotDescription(model="ur5e"),
         camera=CameraModel(64, 48, np.array([[60.0, 0, 32], [0, 60, 24], [0, 0, 1]])),
-        target=AprilTagTarget("tag36h11", 0, 0.1),
+        target=PointsTarget(((0.0, 0.0, 0.0), (0.1, 0.0, 0.0), (0.0, 0.1, 0.0))),
         initial_parent_T_camera=se3.make(np.eye(3), [0, 0.06, 0.04]),
         joints_rad=ready_pose + 0.1 * np.eye(6)[:2],
         base_T_flange=ARMS["ur5e"].forward(ready_pose + 0.1 * np.eye(6)[:2]),
