@@ -6,6 +6,7 @@ are how far apart; no dynamics and no graphics take part.
 
 from __future__ import annotations
 
+import itertools
 from functools import lru_cache
 from typing import Any
 
@@ -35,7 +36,7 @@ def judge(
 def densified(path: Array) -> Array:
     """Poses (M, 4, 4) along a path (N, 4, 4), no two further apart than the step of the sweep."""
     pieces = [path[:1]]
-    for start, end in zip(path[:-1], path[1:], strict=True):
+    for start, end in itertools.pairwise(path):
         count = int(np.ceil(np.linalg.norm(end[:3, 3] - start[:3, 3]) / _STEP_M)) or 1
         twist = se3.log(se3.inverse(start) @ end)
         pieces.append(start @ se3.exp(np.linspace(0, 1, count + 1)[1:, None] * twist))
