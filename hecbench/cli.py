@@ -177,6 +177,7 @@ def solve(
 @click.option("--held-out/--no-held-out", default=None, help="As for solve.")
 @click.option("--out", type=_folder, help="Default: out/<first source's name>.")
 @click.option("--jobs", type=int, default=1, show_default=True, help="Worker processes; -1: one per core.")
+@click.option("--executor", metavar="URL", help="A dask scheduler, tcp://host:port, instead of --jobs.")
 @click.option("--resume", is_flag=True, help="Go on with what --out holds.")
 @_seed
 @_json
@@ -188,6 +189,7 @@ def run(
     held_out: bool | None,
     out: Path | None,
     jobs: int,
+    executor: str | None,
     resume: bool,
     seed: int,
     as_json: bool,
@@ -197,7 +199,7 @@ def run(
         raise InputError("--jobs 0: give a number of processes, or -1 for one per core")
     tasks = _tasks(sources, solvers, levels, samples, seed)
     out = out or Path("out") / Path(sources[0]).name
-    contents = _run(tasks, out, seed, jobs=jobs, resume=resume, held_out=held_out)
+    contents = _run(tasks, out, seed, jobs=jobs, executor=executor, resume=resume, held_out=held_out)
     console.print_notes(contents.damage)
     if as_json:
         console.print_json([estimate.to_json() for estimate in contents.estimates])
@@ -426,6 +428,7 @@ def _run(
     seed: int,
     *,
     jobs: int,
+    executor: str | None = None,
     resume: bool = False,
     held_out: bool | None = None,
 ) -> Any:
@@ -437,5 +440,11 @@ def _run(
     options = replace(_options(seed, held_out), stop_on_bad_input=False)
     with console.progress(sum(len(task.solvers) for task in tasks)) as advance:
         return runner.run(
-            tasks, options, out=out, jobs=jobs, resume=resume, on_result=lambda found: advance(len(found))
+            tasks,
+            options,
+            out=out,
+            jobs=jobs,
+            executor=executor,
+            resume=resume,
+            on_result=lambda found: advance(len(found)),
         )

@@ -6,6 +6,7 @@ import sys
 import traceback
 import zlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -15,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from hecbench import __version__, diagnose, evidence, registry, store
-from hecbench.errors import HecbenchError, InputError, Refusal, SolverFailure
+from hecbench.errors import InputError, Refusal, SolverFailure
 from hecbench.estimate import Estimate, Status, Termination
 from hecbench.evidence import Evidence
 from hecbench.recording import Recording
@@ -284,6 +285,7 @@ def run(
     *,
     out: Path,
     jobs: int = 1,
+    executor: str | None = None,
     resume: bool = False,
     on_result: Callable[[list[Estimate]], None] = lambda estimates: None,
 ) -> store.Contents:
@@ -296,7 +298,7 @@ def run(
     """
     with store.writing(out, resume=resume) as writer:
         done = store.read(out).estimates
-        for estimates, found in _executed(remaining(tasks, done, options), options, jobs):
+        for estimates, found in _executed(remaining(tasks, done, options), options, jobs, executor):
             if found is not None:
                 evidence.save(found, out)
             writer.append(estimates)
@@ -305,15 +307,36 @@ def run(
 
 
 def _executed(
-    tasks: Sequence[Task], options: Options, jobs: int
+    tasks: Sequence[Task], options: Options, jobs: int, executor: str | None
 ) -> Iterator[tuple[list[Estimate], Evidence | None]]:
-    if jobs == 1 or len(tasks) < 2:
+    """The results as they come: here, in worker processes, or on a cluster."""
+    if executor is None and (jobs == 1 or len(tasks) < 2):
         yield from (execute(task, options) for task in tasks)
         return
     from joblib import Parallel, delayed
 
-    try:
-        parallel = Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size="auto")
+    with _backend(executor):
+        parallel = Parallel(n_jobs=jobs if executor is None else -1, return_as="generator_unordered")
         yield from parallel(delayed(execute)(task, options) for task in tasks)
-    except ValueError as error:
-        raise HecbenchError(f"--jobs {jobs}: {error}") from error
+
+
+@contextmanager
+def _backend(executor: str | None) -> Iterator[None]:
+    """joblib's own processes, or the workers of the dask scheduler at a URL."""
+    if executor is None:
+        yield
+        return
+    from joblib import parallel_config
+
+    try:
+        from distributed import Client
+
+        client = Client(executor, timeout="5s", set_as_default=False)
+    except ImportError:
+        raise InputError("--executor needs dask: pip install 'hecbench[cluster]'") from None
+    except (OSError, ValueError, TypeError) as error:
+        raise InputError(
+            f"--executor {executor}: no scheduler answers ({error}); give its tcp://host:port"
+        ) from error
+    with client, parallel_config(backend="dask", client=client):
+        yield

@@ -140,3 +140,24 @@ def test_recordings_are_recognised_or_refused(tmp_path, exact_rig):
     (tmp_path / "empty").mkdir()
     with pytest.raises(InputError, match=r"no known recording. Known are .*native"):
         runner.load_recording(tmp_path / "empty")
+
+
+def test_a_cluster_gives_the_same_results(tmp_path):
+    """The scheduler and its worker live in this process's children on the loopback address."""
+    from distributed import LocalCluster
+
+    here = runner.run(tasks(3), Options(), out=tmp_path / "here")
+    cluster = LocalCluster(
+        n_workers=1, threads_per_worker=1, host="127.0.0.1", dashboard_address=None, silence_logs=50
+    )
+    try:
+        there = runner.run(tasks(3), Options(), out=tmp_path / "there", executor=cluster.scheduler_address)
+    finally:
+        cluster.close()
+    assert comparable(here) == comparable(there)
+
+
+@pytest.mark.parametrize("executor", ["tcp://127.0.0.1:1", "nonsense://x", "127.0.0.1"])
+def test_a_scheduler_that_does_not_answer_is_named(tmp_path, executor):
+    with pytest.raises(InputError, match="--executor"):
+        runner.run(tasks(1), Options(), out=tmp_path, executor=executor)
