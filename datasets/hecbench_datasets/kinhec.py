@@ -78,6 +78,11 @@ def sequence_ids(root: Path) -> list[str]:
     return [str(name) for name in _columns(root / INDEX)["sequence_id"]]
 
 
+def true_X(root: Path) -> dict[str, Array]:
+    """KinHEC's X (4, 4) of each sequence: flange_T_camera, or flange_T_target for a fixed camera."""
+    return dict(zip(sequence_ids(root), _poses(_columns(root / INDEX), "X"), strict=True))
+
+
 def _columns(file: Path, row_group: int | None = None) -> dict[str, Any]:
     import pyarrow
     from pyarrow import parquet
