@@ -17,7 +17,7 @@ from PIL import Image
 from hecbench import recording_io, se3
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
-from hecbench.targets import PointsTarget
+from hecbench.targets import ChessboardTarget
 
 FAST = ("--set", "robot.time_scale=50", "--set", "robot.max_age_s=1")
 
@@ -30,8 +30,8 @@ def cell(tmp_path, ready_pose):
         mounting=Mounting.EYE_IN_HAND,
         sample_ids=("0", "1"),
         robot=RobotDescription(model="ur5e"),
-        camera=CameraModel(64, 48, np.array([[60.0, 0, 32], [0, 60, 24], [0, 0, 1]])),
-        target=PointsTarget(((0.0, 0.0, 0.0), (0.1, 0.0, 0.0), (0.0, 0.1, 0.0))),
+        camera=CameraModel(320, 240, np.array([[300.0, 0, 160], [0, 300, 120], [0, 0, 1]])),
+        target=ChessboardTarget(4, 3, 0.03),
         initial_parent_T_camera=se3.make(np.eye(3), [0, 0.06, 0.04]),
         joints_rad=ready_pose + 0.1 * np.eye(6)[:2],
         base_T_flange=ARMS["ur5e"].forward(ready_pose + 0.1 * np.eye(6)[:2]),
@@ -53,7 +53,9 @@ def test_record_a_plan_with_images(invoke, cell, tmp_path):
     pictures = tmp_path / "pictures"
     pictures.mkdir()
     for k in range(2):
-        Image.fromarray(np.full((48, 64, 3), 100 * k, np.uint8)).save(pictures / f"{k}.png")
+        board = np.indices((4, 5)).sum(0) % 2 * 200 + 30
+        picture = np.pad(np.kron(board, np.ones((40, 40))), ((40, 40), (60 + k, 60 - k)), constant_values=255)
+        Image.fromarray(picture.astype(np.uint8)).save(pictures / f"{k}.png")
     out = tmp_path / "out"
     camera = ("--camera", "images", "--set", f"camera.folder={pictures}")
     result = invoke(cell, "--out", out, *FAST, *camera, "--json")
