@@ -16,6 +16,7 @@ _EXTRAS = {
     "lab": ("mujoco",),
     "cameras": ("pypylon",),
     "viewer": ("viser",),
+    "parquet": ("pyarrow",),
     "cluster": ("distributed",),
 }
 _REQUIRED = ("numpy", "scipy", "numba", "opencv-contrib-python-headless", "airo-models", "pupil-apriltags")
