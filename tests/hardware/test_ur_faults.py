@@ -3,6 +3,7 @@
 import os
 import signal
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -96,6 +97,23 @@ def test_a_hanging_client_is_ended_and_the_arm_stopped(robot, connect):
     assert moved_into(robot, lambda: os.kill(robot._control.pid, signal.SIGSTOP)) is Fault.LINK_LOST
     assert np.abs(watcher.settle().joint_speeds_rad_s).max() == 0
     assert robot.recover(lambda line: True)
+
+
+def test_a_busy_reader_is_not_a_stale_stream(connect, monkeypatch):
+    """As when this program holds the interpreter for a while: the samples wait, they are not missing."""
+    robot = connect()
+    take, pauses = robot._stream._take, [1.5]
+
+    def take_late(sample):
+        if pauses:
+            time.sleep(pauses.pop())
+        take(sample)
+
+    monkeypatch.setattr(robot._stream, "_take", take_late)
+    time.sleep(2.0)
+    assert not pauses
+    assert robot._stream.fault is None
+    robot.settle()
 
 
 def test_a_lost_link_while_reading(connect, controller):
