@@ -148,15 +148,14 @@ class StateStream:
         connection, limit_s = self._worker.connection, self._supervision.max_age_s
         while not self._closing:
             try:
-                content = connection.recv_bytes() if connection.poll(limit_s) else None
-                more = content is not None and connection.poll(0)
+                if connection.poll(limit_s):
+                    self._take(Sample.unpack(connection.recv_bytes()))
+                age_s = time.monotonic() - self._changed_s
+                is_stale = age_s > limit_s and not connection.poll(0)
             except (EOFError, OSError):
                 self._raise(Fault.LINK_LOST, "the client ended")
                 return
-            if content is not None:
-                self._take(Sample.unpack(content))
-            age_s = time.monotonic() - self._changed_s
-            if age_s > limit_s and not more:
+            if is_stale:
                 self._raise(Fault.STALE, f"the newest state is {age_s:.2f} s old, {limit_s:.2f} s allowed")
 
     def _take(self, sample: Sample) -> None:
