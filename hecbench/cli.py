@@ -10,7 +10,6 @@ from __future__ import annotations
 import os
 import shlex
 import sys
-from collections.abc import Sequence
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,9 +20,7 @@ from hecbench import __version__, console
 from hecbench.errors import HecbenchError, InputError
 
 if TYPE_CHECKING:
-    from hecbench.recording import Recording
     from hecbench.runner import Options, Task
-    from hecbench.specs import SolverSpec
 
 COMMAND_GROUP = "hecbench.commands"
 """Entry points of further verbs, loaded when they are named."""
@@ -85,12 +82,13 @@ _any_path = click.Path(path_type=Path)
 @_seed
 def demo(out: Path, samples: int, seed: int) -> None:
     """Calibrate generated recordings with every ready solver; print the tables and write the report."""
-    from hecbench import store
+    from hecbench import planning, store
     from hecbench.report import html
 
     (out / store.FILE_NAME).unlink(missing_ok=True)
     levels = ("tag_2m", "small_tag_2m", "board_2m")
-    contents = _run(_suite_tasks("markers", levels, samples, (), seed), out, seed, jobs=os.cpu_count() or 1)
+    tasks = planning.suite_tasks("markers", levels, samples, (), seed)
+    contents = _run(tasks, out, seed, jobs=os.cpu_count() or 1)
     console.print_tables(contents.estimates)
     path, _ = html.write(out)
     click.echo(f"report: {path}")
@@ -143,13 +141,13 @@ def solve(
     as_json: bool,
 ) -> None:
     """Calibrate one RECORDING; the best estimate comes first."""
-    from hecbench import runner
+    from hecbench import planning, runner
     from hecbench.estimate import Status, best_first
     from hecbench.report.tables import Group, table
 
-    loaded = _prepared(runner.load_recording(recording), views, init, seed)
+    loaded = planning.adjusted(runner.load_recording(recording), views, init, seed)
     console.print_notes(loaded.notes)
-    specs = _specs(solvers, loaded)
+    specs = planning.solvers_for(solvers, loaded)
     if not specs:
         raise HecbenchError(
             f"{recording}: no ready solver can use what it offers: {', '.join(sorted(loaded.offers()))}"
@@ -195,9 +193,11 @@ def run(
     as_json: bool,
 ) -> None:
     """Run solvers on a SUITE or on RECORDINGs into an append-only store; print the tables."""
+    from hecbench import planning
+
     if jobs == 0:
         raise InputError("--jobs 0: give a number of processes, or -1 for one per core")
-    tasks = _tasks(sources, solvers, levels, samples, seed)
+    tasks = planning.tasks(sources, solvers, levels, samples, seed)
     out = out or Path("out") / Path(sources[0]).name
     contents = _run(tasks, out, seed, jobs=jobs, executor=executor, resume=resume, held_out=held_out)
     console.print_notes(contents.damage)
@@ -334,85 +334,6 @@ def export(estimate: Path, format_name: str, out: Path | None, **options: str | 
     else:
         files.write_text(out, text)
         click.echo(f"{out}: {exporter.summary}")
-
-
-def _prepared(recording: Recording, views: int | None, init: Path | None, seed: int) -> Recording:
-    """The recording with fewer samples and another start, as asked for."""
-    from dataclasses import replace
-
-    import numpy as np
-
-    from hecbench import estimate
-
-    if views is not None:
-        if views > len(recording):
-            raise InputError(f"--views {views}: {recording.name} has {len(recording)} samples")
-        chosen = np.random.default_rng(seed).choice(len(recording), views, replace=False)
-        recording = recording.subset(np.sort(chosen))
-    if init is not None:
-        start = estimate.load(init)
-        here, there = (recording.mounting, recording.parent_link), (start.mounting, start.parent_link)
-        if start.parent_T_camera is None or here != there:
-            raise InputError(
-                f"{init}: is {start.status}, {' of '.join(there)}; the recording needs {' of '.join(here)}"
-            )
-        recording = replace(recording, initial_parent_T_camera=start.parent_T_camera)
-    return recording
-
-
-def _specs(names: Sequence[str], recording: Recording) -> list[SolverSpec]:
-    """The named solvers, or all ready ones whose needs the recording will meet."""
-    from hecbench import registry, runner
-    from hecbench.specs import Kind, SolverSpec
-
-    known = registry.load()
-    if names:
-        return [known.get(Kind.SOLVER, name, SolverSpec) for name in dict.fromkeys(names)]
-    offers = runner.will_offer(recording)
-    return [spec for spec in known.ready(Kind.SOLVER, SolverSpec) if spec.needs <= offers]
-
-
-def _tasks(
-    sources: Sequence[str], solvers: Sequence[str], levels: Sequence[str], samples: int | None, seed: int
-) -> list[Task]:
-    from hecbench import registry, runner
-    from hecbench.specs import Kind, SuiteSpec
-
-    suites = [spec.name for spec in registry.load().ready(Kind.SUITE, SuiteSpec)]
-    if sources[0] in suites and len(sources) == 1:
-        return _suite_tasks(sources[0], levels, samples, solvers, seed)
-    if levels or samples is not None:
-        raise InputError(
-            f"--level and --samples are for a suite ({', '.join(sorted(suites))}), not for recordings"
-        )
-    tasks = []
-    for source in sources:
-        if not Path(source).exists():
-            raise InputError(
-                f"{source}: is neither a suite ({', '.join(sorted(suites))}) nor a path that exists"
-            )
-        specs = _specs(solvers, runner.load_recording(Path(source)))
-        tasks.append(runner.Task(tuple(spec.name for spec in specs), path=Path(source)))
-    return tasks
-
-
-def _suite_tasks(
-    name: str, levels: Sequence[str], samples: int | None, solvers: Sequence[str], seed: int
-) -> list[Task]:
-    from hecbench import registry, runner
-    from hecbench.specs import Kind, SuiteSpec
-
-    suite = registry.load().get(Kind.SUITE, name, SuiteSpec)
-    for level in levels:
-        if level not in suite.levels:
-            raise InputError(f"--level {level}: the suite '{name}' has {', '.join(suite.levels)}")
-    tasks = []
-    for level in levels or suite.levels:
-        specs = _specs(solvers, suite.make(level, 0, seed))
-        names = tuple(spec.name for spec in specs)
-        for index in range(samples or suite.default_samples):
-            tasks.append(runner.Task(names, suite=name, level=level, index=index))
-    return tasks
 
 
 def _options(seed: int, held_out: bool | None) -> Options:

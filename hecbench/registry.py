@@ -6,7 +6,6 @@ modules with hooks. Every module is imported inside its own ``try``, so one bad 
 
 from __future__ import annotations
 
-import pkgutil
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
@@ -61,13 +60,6 @@ class Plugin:
             "distribution": self.distribution,
             "version": self.version,
         }
-
-
-def submodules(package_name: str, folder: str = "") -> tuple[str, ...]:
-    """Full names of the modules in a package (or in its sub-package `folder`), without importing them."""
-    package = import_module(f"{package_name}.{folder}" if folder else package_name)
-    found = pkgutil.iter_modules(package.__path__, prefix=f"{package.__name__}.")
-    return tuple(module.name for module in found if not module.ispkg)
 
 
 @dataclass(frozen=True)

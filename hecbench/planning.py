@@ -1,0 +1,80 @@
+"""From what a user names to what is run: solvers by name or by need, suites and recordings as tasks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from hecbench import estimate, registry, runner
+from hecbench.errors import InputError
+from hecbench.recording import Recording
+from hecbench.runner import Task
+from hecbench.specs import Kind, SolverSpec, SuiteSpec
+
+
+def adjusted(recording: Recording, views: int | None, init: Path | None, seed: int) -> Recording:
+    """The recording with fewer samples and another start, as asked for."""
+    if views is not None:
+        if views > len(recording):
+            raise InputError(f"--views {views}: {recording.name} has {len(recording)} samples")
+        chosen = np.random.default_rng(seed).choice(len(recording), views, replace=False)
+        recording = recording.subset(np.sort(chosen))
+    if init is not None:
+        start = estimate.load(init)
+        here, there = (recording.mounting, recording.parent_link), (start.mounting, start.parent_link)
+        if start.parent_T_camera is None or here != there:
+            raise InputError(
+                f"{init}: is {start.status}, {' from '.join(there)}; the recording needs {' from '.join(here)}"
+            )
+        recording = replace(recording, initial_parent_T_camera=start.parent_T_camera)
+    return recording
+
+
+def solvers_for(names: Sequence[str], recording: Recording) -> list[SolverSpec]:
+    """The named solvers, or all ready ones whose needs the recording will meet."""
+    known = registry.load()
+    if names:
+        return [known.get(Kind.SOLVER, name, SolverSpec) for name in dict.fromkeys(names)]
+    offers = runner.will_offer(recording)
+    return [spec for spec in known.ready(Kind.SOLVER, SolverSpec) if spec.needs <= offers]
+
+
+def tasks(
+    sources: Sequence[str], solvers: Sequence[str], levels: Sequence[str], samples: int | None, seed: int
+) -> list[Task]:
+    """The tasks of one suite, or of recordings by path.
+
+    Raises:
+        InputError: a name that is neither, or a suite's option given for recordings.
+    """
+    suites = [spec.name for spec in registry.load().ready(Kind.SUITE, SuiteSpec)]
+    if sources[0] in suites and len(sources) == 1:
+        return suite_tasks(sources[0], levels, samples, solvers, seed)
+    if levels or samples is not None:
+        raise InputError(f"--level and --samples are for a suite ({', '.join(suites)}), not for recordings")
+    found = []
+    for source in sources:
+        if not Path(source).exists():
+            raise InputError(f"{source}: is neither a suite ({', '.join(suites)}) nor a path that exists")
+        specs = solvers_for(solvers, runner.load_recording(Path(source)))
+        found.append(Task(tuple(spec.name for spec in specs), path=Path(source)))
+    return found
+
+
+def suite_tasks(
+    name: str, levels: Sequence[str], samples: int | None, solvers: Sequence[str], seed: int
+) -> list[Task]:
+    """The tasks of a suite: each level's recordings with the solvers that its recordings can feed."""
+    suite = registry.load().get(Kind.SUITE, name, SuiteSpec)
+    for level in levels:
+        if level not in suite.levels:
+            raise InputError(f"--level {level}: the suite '{name}' has {', '.join(suite.levels)}")
+    found = []
+    for level in levels or suite.levels:
+        names = tuple(spec.name for spec in solvers_for(solvers, suite.make(level, 0, seed)))
+        indices = range(samples or suite.default_samples)
+        found += [Task(names, suite=name, level=level, index=index) for index in indices]
+    return found
