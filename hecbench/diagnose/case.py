@@ -21,11 +21,10 @@ Array = NDArray[np.float64]
 Observe = Callable[[Recording], Recording]
 """Fills what is not given but computable: base_T_flange from joints, camera_T_target from corners."""
 
-_CHI2_MEDIAN = 5.35
-"""Median of chi-square with 6 degrees of freedom."""
-STANDS_OUT = 8.0
-"""Squared distance from what the others say, relative to the typical sample's."""
-_REFITS = 5
+STANDS_OUT = 5.0
+"""Variance ratio (6 and 6 N - 19 degrees of freedom) that a sample of ten exceeds once in 1500 times."""
+_LEAST_SHARE = 0.5
+"""Of the samples that must agree."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,15 +113,15 @@ class Case:
         """The calibration of the samples that agree, applied to all usable ones, and which these are (N,)."""
         if self.fit is None:
             return None
-        found, agreeing = self.fit, np.ones(len(self.usable), bool)
+        agreeing = np.ones(len(self.usable), bool)
         try:
-            for _ in range(_REFITS):
-                found = found.refitted_to(agreeing)
-                ratios = disagreement_ratios(found)
-                now = ratios <= STANDS_OUT
-                if now.sum() < max(LEAST_SAMPLES, len(now) // 2) or (now == agreeing).all():
+            found = self.fit.refitted_to(agreeing)
+            while agreeing.sum() > max(LEAST_SAMPLES + 1, len(agreeing) * _LEAST_SHARE):
+                different = np.where(agreeing, found.studentised(agreeing), 0.0)
+                if different.max() <= STANDS_OUT:
                     break
-                agreeing = now
+                agreeing[different.argmax()] = False
+                found = found.refitted_to(agreeing)
         except (SolverFailure, np.linalg.LinAlgError):
             return None
         return found, agreeing
@@ -160,8 +159,9 @@ class Case:
         """How much noisier the agreeing samples are than the typical noise that weighs them."""
         if self.agreed is None:
             return 1.0
-        squares = self.agreed[0].disagreement()[0][self.agreed[1]]
-        return float(np.sqrt(np.median(squares) / _CHI2_MEDIAN))
+        found, agreeing = self.agreed
+        squares, gradients, _ = found.reduced
+        return float(np.sqrt(squares[agreeing].sum() / (6 * agreeing.sum() - gradients.shape[1])))
 
     def ids(self, chosen: NDArray[np.integer] | NDArray[np.bool_]) -> tuple[str, ...]:
         """Ids of some of the usable samples."""
@@ -170,12 +170,6 @@ class Case:
     def with_robot_poses(self, base_T_flange: Array) -> Case:
         """The case as it would be with other robot poses (samples, 4, 4)."""
         return replace(self, recording=replace(self.recording, base_T_flange=base_T_flange))
-
-
-def disagreement_ratios(found: Fit) -> Array:
-    """Squared distances (N,) of the samples from what the others say, relative to the typical sample's."""
-    squares = found.disagreement()[0]
-    return np.asarray(squares / max(float(np.median(squares)), 0.1 * _CHI2_MEDIAN))
 
 
 def inverted(base_T_flange: Array) -> Array:

@@ -8,6 +8,7 @@ poses of a planar target that look alike count as alike. The target's size is an
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -34,6 +35,13 @@ _ASSUMED_HALF_WIDTH_M = 0.05
 _WIDE = np.repeat([np.deg2rad(10.0), 0.2], 3) ** -2.0
 _PAIR_ANGLE_RAD = np.deg2rad(1.0)
 _POSITIONS_FOR_LINEAR = 6
+_POSE_FREEDOM = 6
+_CHI2_MEDIAN = 5.35
+"""Median of chi-square with 6 degrees of freedom."""
+_ROBUST = 1.5
+"""By how much the scatter may exceed what the median sample suggests."""
+_LEAST_SCATTER = 0.02
+"""Of the typical variances: exact data must not make rounding errors stand out."""
 _ITERATIONS = 20
 
 
@@ -93,27 +101,57 @@ class Fit:
         depth = float(np.median(self.camera_T_target[:, 2, 3]))
         return 1e3 * pixels * abs(depth) / float(self.problem.sensor.focal_px)  # type: ignore[attr-defined]
 
-    def disagreement(self) -> tuple[Array, Array, Array]:
-        """How far each sample is from what the others say.
+    @cached_property
+    def reduced(self) -> tuple[Array, Array, Array]:
+        """What each sample says about the shared unknowns once its robot pose may move by the typical noise.
 
         Returns:
-            Squared Mahalanobis distances (N,) of 6 degrees of freedom under the typical noise; and by how many
-            mm (N,) and deg (N,) the target is displaced by the change of the robot pose that would explain
-            what was seen.
+            Squared Mahalanobis distances (N,), gradients (N, G) and information (N, G, G).
         """
+        r, J, J_robot = self._whitened
+        inner = np.swapaxes(J_robot, 1, 2) @ J_robot + np.diag(TYPICAL_NOISE.robot_information)
+        free_r = r - J_robot @ np.linalg.solve(inner, np.swapaxes(J_robot, 1, 2) @ r)
+        free_J = J - J_robot @ np.linalg.solve(inner, np.swapaxes(J_robot, 1, 2) @ J)
+        transposed = np.swapaxes(J, 1, 2)
+        return (r * free_r).sum((1, 2)), (transposed @ free_r)[..., 0], transposed @ free_J
+
+    @property
+    def _whitened(self) -> tuple[Array, Array, Array]:
+        """Residuals (N, R, 1), and derivatives by the shared unknowns (N, R, G) and by robot poses (N, R, 6)."""
         values, _, jacobian = predict(self.problem, self.state)
         columns = slice(6, 12) if self.problem.mounting is Mounting.EYE_TO_HAND else slice(0, 6)
         count = len(values)
-        J = jacobian[..., columns].reshape(count, -1, 6) / TYPICAL_NOISE.observed
-        r = (values - self.problem.observed).reshape(count, -1) / TYPICAL_NOISE.observed
-        gradient = np.swapaxes(J, 1, 2) @ r[..., None]
-        information = np.swapaxes(J, 1, 2) @ J
-        absorbed = np.linalg.solve(information + np.diag(TYPICAL_NOISE.robot_information), gradient)
-        squares = (r**2).sum(1) - (gradient * absorbed).sum((1, 2))
-        changes = -np.linalg.solve(information + np.diag(_WIDE), gradient)[..., 0]
+        J = jacobian.reshape(count, -1, jacobian.shape[-1]) / TYPICAL_NOISE.observed
+        r = (values - self.problem.observed).reshape(count, -1, 1) / TYPICAL_NOISE.observed
+        return r, J, J[..., columns]
+
+    def displacements(self) -> tuple[Array, Array]:
+        """By how many mm (N,) and deg (N,) a change of the robot pose must displace the target to explain it."""
+        r, _, J_robot = self._whitened
+        transposed = np.swapaxes(J_robot, 1, 2)
+        changes = -np.linalg.solve(transposed @ J_robot + np.diag(_WIDE), transposed @ r)[..., 0]
         explained = self._predicted(self.problem.base_T_flange @ se3.exp(changes))
         millimetres = 1e3 * se3.translation_error_m(self.camera_T_target, explained)
-        return squares, millimetres, np.rad2deg(np.linalg.norm(changes[:, :3], axis=1))
+        return millimetres, np.rad2deg(np.linalg.norm(changes[:, :3], axis=1))
+
+    def studentised(self, agreeing: NDArray[np.bool_]) -> Array:
+        """How unlikely each sample is given the agreeing others: about 1 when it is like them (F distributed).
+
+        The squared distance (6 degrees of freedom) of a sample from what the others predict, their calibration's
+        own uncertainty included, over their scatter.
+        """
+        squares, gradients, information = self.reduced
+        total, unknowns = information[agreeing].sum(0), gradients.shape[1]
+        sign = np.where(agreeing, 1.0, -1.0)
+        others = total - sign[:, None, None] * information
+        steps = np.linalg.solve(others, gradients[..., None])[..., 0]
+        distances = squares + sign * (gradients * steps).sum(1)
+        freedom = _POSE_FREEDOM * (agreeing.sum() - agreeing) - unknowns
+        scatter = (squares[agreeing].sum() - np.where(agreeing, distances, 0.0)) / np.maximum(freedom, 1)
+        robust = _ROBUST * float(np.median(distances)) / _CHI2_MEDIAN
+        return np.asarray(
+            distances / _POSE_FREEDOM / np.clip(scatter, _LEAST_SCATTER, max(robust, _LEAST_SCATTER))
+        )
 
     def subset(self, chosen: NDArray[np.integer] | NDArray[np.bool_]) -> Fit:
         """The same calibration of some of the samples."""
@@ -124,11 +162,10 @@ class Fit:
         )
         return Fit(problem, replace(self.state, base_T_flange=self.state.base_T_flange[chosen]))
 
-    def with_robot_poses(self, base_T_flange: Array, chosen: NDArray[np.int64]) -> Fit:
-        """The same calibration for the images of the chosen samples with other robot poses (M, 4, 4)."""
-        some = self.subset(chosen)
-        problem = replace(some.problem, base_T_flange=base_T_flange)
-        return Fit(problem, replace(some.state, base_T_flange=base_T_flange))
+    def with_robot_poses(self, base_T_flange: Array) -> Fit:
+        """The same calibration with other robot poses (N, 4, 4)."""
+        problem = replace(self.problem, base_T_flange=base_T_flange)
+        return Fit(problem, replace(self.state, base_T_flange=base_T_flange))
 
     def refined(self) -> Solution:
         """The calibration with robot corrections under the typical noise, and its covariance.
@@ -186,7 +223,7 @@ def fit(
     points_m: Array,
     focal_px: float | None = None,
 ) -> Fit | None:
-    """The calibration with the least robust pixel error from the better of two starts; None when there is none.
+    """The calibration with the least robust pixel error, from up to two starts; None when there is none.
 
     Args:
         mounting: where the camera sits.
@@ -200,14 +237,14 @@ def fit(
     observed = sensor(seen.reshape(-1, 3), np.zeros(0))[0].reshape(*seen.shape[:2], 2)
     problem = Problem(mounting, base_T_flange, points_m, observed, sensor, free_scale=True)
     noise = Noise(TYPICAL_NOISE.observed)
-    starts = [(linearise(problem, state, noise).cost, state) for state in _starts(problem, camera_T_target)]
-    cost, state = min(starts, key=lambda start: start[0])
-    if not np.isfinite(cost):
-        return None
-    try:
-        return Fit(problem, adjust(problem, state, noise, max_iterations=_ITERATIONS).state)
-    except (SolverFailure, np.linalg.LinAlgError):
-        return None
+    found: list[Fit] = []
+    starts = list(_starts(problem, camera_T_target))
+    for state in sorted(starts, key=lambda state: linearise(problem, state, noise).cost):
+        with suppress(SolverFailure, np.linalg.LinAlgError):
+            found.append(Fit(problem, adjust(problem, state, noise, max_iterations=_ITERATIONS).state))
+            if found[-1].relative < EXPLAINS:
+                break
+    return min(found, key=lambda candidate: candidate.typical_px, default=None)
 
 
 def _starts(problem: Problem, camera_T_target: Array) -> Iterator[State]:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench.diagnose.case import STANDS_OUT, Case, disagreement_ratios
+from hecbench.diagnose.case import STANDS_OUT, Case
 from hecbench.diagnose.finding import Finding, Severity, names
 
 ID = "outlier_sample"
 LIMIT_MM = 12.0
 LIMIT_DEG = 2.0
-NOTICEABLE_MM = 2.0
-NOTICEABLE_DEG = 0.3
+NOTICEABLE_MM = 4.0
+NOTICEABLE_DEG = 0.5
 _ALIKE = 0.8
 
 
@@ -21,9 +21,8 @@ def examine(case: Case) -> tuple[Finding | None, Case]:
     if case.agreed is None:
         return None, case
     found, agreeing = case.agreed
-    _, millimetres, degrees = found.disagreement()
-    ratios = disagreement_ratios(found)
-    worst = float(np.sqrt(ratios.max()))
+    millimetres, degrees = found.displacements()
+    worst = float(np.sqrt(found.studentised(agreeing).max()))
     limit = float(np.sqrt(STANDS_OUT))
     odd = ~agreeing & ((millimetres > NOTICEABLE_MM) | (degrees > NOTICEABLE_DEG))
     odd &= ~np.isin(case.ids(np.arange(len(odd))), list(case.explained))

@@ -14,7 +14,8 @@ from hecbench.diagnose.fit import LEAST_SAMPLES, MUCH_BETTER
 ID = "pairing"
 _SHIFTS = (1, -1)
 _FITS = 2 * STANDS_OUT
-_FAR_BETTER = 0.1
+_FAR_BETTER = 0.02
+"""With the wrong robot pose a planar target may have got its mirrored pose, which then still fits badly."""
 
 
 def examine(case: Case) -> tuple[Finding | None, Case]:
@@ -60,17 +61,18 @@ def _exchanged(case: Case) -> list[tuple[int, int]]:
     if case.agreed is None:
         return []
     found, agreeing = case.agreed
-    odd = np.flatnonzero(~agreeing)
-    squares = found.disagreement()[0]
-    typical = float(np.median(squares))
+    odd, before = np.flatnonzero(~agreeing), found.studentised(agreeing)
     pairs: list[tuple[int, int]] = []
     taken: set[int] = set()
     for k, a in enumerate(odd.tolist()):
         for b in odd[k + 1 :].tolist():
             if {a, b} & taken:
                 continue
-            crossed = found.with_robot_poses(case.base_T_flange[[b, a]], np.array([a, b])).disagreement()[0]
-            if (crossed <= _FITS * typical).all() and (crossed < _FAR_BETTER * squares[[a, b]]).all():
+            poses = case.base_T_flange
+            poses[[a, b]] = poses[[b, a]]
+            crossed = found.with_robot_poses(poses)
+            after = crossed.studentised(agreeing)[[a, b]]
+            if (after < np.maximum(_FITS, _FAR_BETTER * before[[a, b]])).all():
                 pairs.append((a, b))
                 taken |= {a, b}
     return pairs
