@@ -11,8 +11,8 @@ _jit = numba.njit(cache=True, nogil=True)
 
 
 @_jit
-def part_colours(part, observed, box, current, huber, sums, counts):
-    """Robust sums of the observed colours of every part over pixels whose four neighbours show the same part.
+def part_colours(part, observed, box, current, huber, margin, sums, counts):
+    """Robust sums of the observed colours of every part over pixels `margin` or more inside it.
 
     `part` (H, W), `observed` (H, W, C), `current` (P, C) the colours that the Huber weight is measured from. Fills
     `sums` (P, C) and `counts` (P, C), the sums of the weights.
@@ -21,16 +21,16 @@ def part_colours(part, observed, box, current, huber, sums, counts):
     channels = sums.shape[1]
     sums[:] = 0.0
     counts[:] = 0.0
-    for y in range(max(box[2], 1), min(box[3], height - 2) + 1):
-        for x in range(max(box[0], 1), min(box[1], width - 2) + 1):
+    for y in range(max(box[2], margin), min(box[3], height - 1 - margin) + 1):
+        for x in range(max(box[0], margin), min(box[1], width - 1 - margin) + 1):
             k = part[y, x]
-            if (
-                k < 0
-                or part[y, x - 1] != k
-                or part[y, x + 1] != k
-                or part[y - 1, x] != k
-                or part[y + 1, x] != k
-            ):
+            if k < 0:
+                continue
+            pure = True
+            for step in range(1, margin + 1):
+                pure = pure and part[y, x - step] == k and part[y, x + step] == k
+                pure = pure and part[y - step, x] == k and part[y + step, x] == k
+            if not pure:
                 continue
             for c in range(channels):
                 off = abs(observed[y, x, c] - current[k, c])
@@ -54,12 +54,23 @@ def cost_change(image, observed, box, background, huber, channels):
 
 
 @_jit
-def normal_equations(pixels, rates, change, columns, image, observed, huber, slot, rows, touched, A, b):
-    """Add J'WJ to `A` (M, M) and -J'Wr to `b` (M,) for the pixels that the crossings change.
+def huber_slope(image, observed, huber, out):
+    """The derivative of the Huber cost by every value of `image` (H, W, C), into `out`."""
+    for y in range(image.shape[0]):
+        for x in range(image.shape[1]):
+            for c in range(image.shape[2]):
+                residual = image[y, x, c] - observed[y, x, c]
+                out[y, x, c] = min(max(residual, -huber), huber)
+
+
+@_jit
+def normal_equations(pixels, rates, change, columns, image, observed, slope, huber, slot, rows, touched, A, b):
+    """Add J'WJ to `A` (M, M) and -J's to `b` (M,) for the pixels that the crossings change.
 
     `pixels` (N, 2) flat; `rates` (N, 2) how each pixel mixes; `change` (N, C) colour of p minus colour of q;
-    `columns` (N, M) dt by the unknowns; `slot` (H W,) holds -1 before and after; `rows` (K, C, M) and `touched` (K,)
-    are scratch. Pixels that several crossings change get the sum of their rows.
+    `columns` (N, M) dt by the unknowns; `slope` (H, W, C) the cost's derivative by the sharp image; `slot` (H W,)
+    holds -1 before and after; `rows` (K, C, M) and `touched` (K,) are scratch. Pixels that several crossings
+    change get the sum of their rows.
     """
     width = image.shape[1]
     channels, unknowns = change.shape[1], columns.shape[1]
@@ -87,11 +98,11 @@ def normal_equations(pixels, rates, change, columns, image, observed, huber, slo
         y, x = pixel // width, pixel % width
         slot[pixel] = -1
         for c in range(channels):
-            residual = image[y, x, c] - observed[y, x, c]
-            weight = 1.0 if abs(residual) <= huber else huber / abs(residual)
+            residual = abs(image[y, x, c] - observed[y, x, c])
+            weight = 1.0 if residual <= huber else huber / residual
             for m in range(unknowns):
+                b[m] -= rows[k, c, m] * slope[y, x, c]
                 weighted = weight * rows[k, c, m]
-                b[m] -= weighted * residual
                 for other in range(unknowns):
                     A[m, other] += weighted * rows[k, c, other]
     return count

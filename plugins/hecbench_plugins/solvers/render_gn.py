@@ -2,14 +2,14 @@
 
 Coarse to fine on one CPU core: translation from centroid and area of the mask; the drawn contour against the
 signed distance of the mask's contour; the anti-aliased picture of flat parts, one colour per part estimated
-within the loop. Where shading or a textured background contradicts flat colours, the mask's coverage and the
-sub-pixel place of every visible edge take the place of the colours.
+within the loop. Before a textured background the mask takes the place of the colours: its coverage, then the intervals
+between pixel centres through which its contour must pass.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,8 @@ _TERMINATIONS = {
     "stalled": Termination.STALLED,
     "iterations": Termination.MAX_ITERATIONS,
 }
+_BLURS_PX = (0.5, 0.75, 1.0, 1.25, 1.5, 2.0)
+_BLUR_GAIN = 1.0
 _RESTART_TURNS_DEG = ((0, 0, 0), (0, 0, 25), (0, 0, -25), (0, 20, 0), (0, -20, 0), (20, 0, 0), (-20, 0, 0))
 
 
@@ -42,11 +44,14 @@ class RenderGN:
         huber: residual in [0, 1] from which on a pixel's colour counts less.
         good_overlap: intersection over union of mask and drawing below which other starts are tried.
         least_overlap: the same below which the run is called a failure.
+        most_violated: share of the contour beside the mask's changes above which the mask is not one of sampled
+            pixels and the coverage alone decides.
     """
 
     huber: float = 0.3
     good_overlap: float = 0.9
     least_overlap: float = 0.6
+    most_violated: float = 0.25
 
     def __call__(self, recording: Recording, *, rng: np.random.Generator) -> Estimate:
         """Calibrate from the recording's start."""
@@ -90,17 +95,25 @@ class RenderGN:
         return best
 
     def _refine(self, views: list[View], pose: Array, trace: stages.Trace) -> evidence.End:
-        """Photometry where flat colours explain the pictures, else coverage and edges."""
-        flat = [view for view in views if view.has_image and view.uniform_background]
-        if len(flat) == len(views):
+        """Photometry where flat colours explain the pictures, else coverage and the intervals of the masks."""
+        if all(view.has_image and view.uniform_background for view in views):
             for level, rounds in ((4, 8), (2, 8), (1, 20)):
                 photometry = stages.Photometry(views, level, slice(0, 3), self.huber, trace)
                 descent = stages.descend(photometry, pose, rounds, trace, f"colour/{level}")
                 pose = descent.pose
-            return evidence.End("photometric", descent, photometry)
+            for blur in _BLURS_PX:
+                blurred = stages.Photometry(views, 1, slice(0, 3), self.huber, trace, blur_px=blur)
+                if blurred(pose)[0] > _BLUR_GAIN * descent.cost:  # costs are negative: the lower the better
+                    break
+                descent = stages.descend(blurred, pose, 20, trace, f"blur {blur}/1")
+                pose, photometry = descent.pose, blurred
+            return evidence.End("colour", descent, photometry)
         coverage = stages.Photometry(views, 1, slice(3, 4), self.huber, trace)
         descent = stages.descend(coverage, pose, 20, trace, "coverage/1")
-        return evidence.End("coverage", descent, coverage)
+        pose, violated = stages.between_pixels(views, coverage, descent.pose, trace)
+        if violated > self.most_violated:
+            return evidence.End("coverage", descent, coverage)
+        return evidence.End("intervals", replace(descent, pose=pose), coverage)
 
 
 @hookimpl
