@@ -146,13 +146,12 @@ def solve(
     from hecbench.report.tables import Group, table
 
     loaded = planning.adjusted(runner.load_recording(recording), views, init, seed)
-    console.print_notes(loaded.notes)
     specs = planning.solvers_for(solvers, loaded)
     if not specs:
         raise HecbenchError(
             f"{recording}: no ready solver can use what it offers: {', '.join(sorted(loaded.offers()))}"
         )
-    estimates = best_first(runner.solve(loaded, specs, _options(seed, held_out)))
+    estimates = best_first(runner.solve(loaded, specs, _options(seed, held_out), say=console.say))
     for estimate in estimates if out else ():
         estimate.save(Path(str(out)) / f"{estimate.solver}.json")
     if as_json:
@@ -200,7 +199,8 @@ def run(
     tasks = planning.tasks(sources, solvers, levels, samples, seed)
     out = out or Path("out") / Path(sources[0]).name
     contents = _run(tasks, out, seed, jobs=jobs, executor=executor, resume=resume, held_out=held_out)
-    console.print_notes(contents.damage)
+    for sentence in contents.damage:
+        console.say(sentence)
     if as_json:
         console.print_json([estimate.to_json() for estimate in contents.estimates])
     else:
@@ -218,7 +218,8 @@ def report(folder: Path, as_json: bool) -> None:
     from hecbench.report import html
 
     path, contents = html.write(folder)
-    console.print_notes(contents.damage)
+    for sentence in contents.damage:
+        console.say(sentence)
     summary = {"report": str(path), "results": len(contents.estimates), "damage": contents.damage}
     if as_json:
         console.print_json(summary)
@@ -304,7 +305,8 @@ def import_recording(source: Path, destination: Path, format_name: str | None) -
     else:
         loaded = registry.load().get(Kind.DATASET, format_name, DatasetSpec).load(source)
     recording_io.save(loaded, destination)
-    console.print_notes(loaded.notes)
+    for note in loaded.notes:
+        console.say(note)
     click.echo(f"{destination}: {loaded.name}, {loaded.mounting}, {len(loaded)} samples")
 
 

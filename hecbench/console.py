@@ -23,10 +23,9 @@ def print_json(value: Any) -> None:
     click.echo(msgspec.json.format(msgspec.json.encode(value), indent=1))
 
 
-def print_notes(notes: Sequence[str]) -> None:
-    """Lines on stderr."""
-    for note in notes:
-        click.echo(note, err=True)
+def say(note: str) -> None:
+    """A line on stderr."""
+    click.echo(note, err=True)
 
 
 def print_tables(estimates: Sequence[Estimate]) -> None:

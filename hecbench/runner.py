@@ -115,10 +115,21 @@ def with_robot_poses(recording: Recording) -> Recording:
     return replace(recording, base_T_flange=base_T_flange)
 
 
-def solve(recording: Recording, specs: Iterable[SolverSpec], options: Options = Options()) -> list[Estimate]:
-    """One estimate of each solver, in the order given, with errors and held-out residuals."""
+def solve(
+    recording: Recording,
+    specs: Iterable[SolverSpec],
+    options: Options = Options(),
+    *,
+    say: Callable[[str], None] = lambda note: None,
+) -> list[Estimate]:
+    """One estimate of each solver, in the order given, with errors and held-out residuals.
+
+    `say` gets each note about how the recording was read and what was computed from it.
+    """
     origin = _provenance(recording, options)
     recording = prepare(recording)
+    for note in recording.notes:
+        say(note)
     blind = recording.without_truth()
     return [
         replace(

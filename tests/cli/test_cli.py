@@ -17,11 +17,6 @@ from hecbench.recording import Mounting
 HECBENCH = Path(sys.executable).parent / "hecbench"
 
 
-def hecbench(*arguments, cwd=None):
-    command = [HECBENCH, *map(str, arguments)]
-    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=240, check=False)
-
-
 @pytest.fixture
 def cell(tmp_path):
     recording = conformance.rig(np.random.default_rng(1), Mounting.EYE_IN_HAND, noise=1e-3)
@@ -29,17 +24,7 @@ def cell(tmp_path):
     return tmp_path / "cell"
 
 
-def refused(finished, *parts):
-    """Exit code 2 and one line on stderr that holds every part."""
-    assert finished.returncode == 2, finished.stderr
-    assert finished.stdout == ""
-    assert finished.stderr.startswith("hecbench: ")
-    assert finished.stderr.count("\n") == 1
-    for part in parts:
-        assert part in finished.stderr
-
-
-def test_solve_prints_json_best_first_and_writes_files(cell, tmp_path):
+def test_solve_prints_json_best_first_and_writes_files(hecbench, cell, tmp_path):
     done = hecbench("solve", cell, "--json", "--out", tmp_path / "answers")
     assert done.returncode == 0, done.stderr
     estimates = json.loads(done.stdout)
@@ -55,7 +40,7 @@ def test_solve_prints_json_best_first_and_writes_files(cell, tmp_path):
     assert written["provenance"]["command"].startswith("hecbench solve")
 
 
-def test_solve_with_named_solver_views_and_start(cell, tmp_path):
+def test_solve_with_named_solver_views_and_start(hecbench, cell, tmp_path):
     assert hecbench("solve", cell, "--solver", "shah", "--out", tmp_path).returncode == 0
     done = hecbench(
         "solve", cell, "--solver", "shah", "--views", 6, "--init", tmp_path / "shah.json", "--json"
@@ -66,7 +51,7 @@ def test_solve_with_named_solver_views_and_start(cell, tmp_path):
     assert "flange_T_camera by shah" in text
 
 
-def test_a_named_solver_without_an_answer_exits_1(tmp_path):
+def test_a_named_solver_without_an_answer_exits_1(hecbench, tmp_path):
     still = conformance.rig(np.random.default_rng(1), Mounting.EYE_TO_HAND, rotations=np.zeros((8, 3)))
     recording_io.save(still, tmp_path / "still")
     done = hecbench("solve", tmp_path / "still", "--solver", "park", "--json")
@@ -82,7 +67,7 @@ def rewrite(cell, change):
     (cell / "recording.json").write_text(json.dumps(content))
 
 
-def test_bad_input_is_one_line_and_exit_2(cell, tmp_path):
+def test_bad_input_is_one_line_and_exit_2(hecbench, refused, cell, tmp_path):
     refused(hecbench("solve", tmp_path / "nowhere"), "nowhere", "does not exist")
     refused(hecbench("solve", tmp_path), "no known recording")
     refused(hecbench("solve", cell, "--solver", "tasi"), "tasi", "choose one of")
@@ -101,13 +86,13 @@ def test_bad_input_is_one_line_and_exit_2(cell, tmp_path):
     refused(hecbench("solve", cell), "recording.json")
 
 
-def test_usage_errors_exit_2():
+def test_usage_errors_exit_2(hecbench):
     assert hecbench("solve").returncode == 2
     assert hecbench("frobnicate").returncode == 2
     assert hecbench("solve", "x", "--seed", "-1").returncode == 2
 
 
-def test_images_are_not_needed_unless_a_solver_needs_them(cell):
+def test_images_are_not_needed_unless_a_solver_needs_them(hecbench, cell):
     rewrite(cell, lambda c: [s.update(image=f"images/{s['id']}.png") for s in c["samples"]])
     assert hecbench("solve", cell, "--solver", "park").returncode == 0
     (cell / "images").mkdir()
@@ -115,7 +100,7 @@ def test_images_are_not_needed_unless_a_solver_needs_them(cell):
     assert hecbench("solve", cell, "--solver", "park").returncode == 0
 
 
-def test_run_report_and_resume(cell, tmp_path):
+def test_run_report_and_resume(hecbench, refused, cell, tmp_path):
     out = tmp_path / "out"
     arguments = ("run", "markers", "--level", "board_2m", "--samples", 3, "--solver", "park", "--out", out)
     first = hecbench(*arguments, "--json")
@@ -135,7 +120,7 @@ def test_run_report_and_resume(cell, tmp_path):
     assert "markers: board_2m" in (out / "report.html").read_text()
 
 
-def test_a_killed_run_goes_on_where_it_was(tmp_path):
+def test_a_killed_run_goes_on_where_it_was(hecbench, tmp_path):
     """kill -9 at some moment: what is written is whole, and --resume completes the run without doubles."""
     out = tmp_path / "out"
     arguments = [
@@ -158,13 +143,13 @@ def test_a_killed_run_goes_on_where_it_was(tmp_path):
     os.kill(process.pid, signal.SIGKILL)
     process.wait()
     partial = store.read_bytes().count(b"\n")
-    assert 0 < partial
+    assert partial > 0
     resumed = hecbench(*arguments, "--resume", "--json")
     items = [e["item"] for e in json.loads(resumed.stdout)]
     assert sorted(items) == [f"{i:06d}" for i in range(150)]
 
 
-def test_plugins_and_doctor():
+def test_plugins_and_doctor(hecbench):
     listed = json.loads(hecbench("plugins", "--kind", "solver", "--json").stdout)
     park = next(row for row in listed if row["name"] == "park")
     assert park["status"] == "ready"
@@ -175,13 +160,13 @@ def test_plugins_and_doctor():
     assert states["cv2.calibrateHandEye"] == "ok"
 
 
-def test_conformance_verb():
+def test_conformance_verb(hecbench):
     done = hecbench("conformance", "shah", "--json")
     assert done.returncode == 0
     assert all(check["passed"] for check in json.loads(done.stdout))
 
 
-def test_demo_makes_tables_and_a_report(tmp_path):
+def test_demo_makes_tables_and_a_report(hecbench, tmp_path):
     done = hecbench("demo", "--samples", 2, "--out", "demo", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "markers: small_tag_2m" in done.stdout
@@ -210,7 +195,7 @@ def test_listing_plugins_imports_neither_torch_nor_mujoco():
     assert done.returncode == 0, done.stderr
 
 
-def test_the_answer_is_the_transform_that_was_measured(tmp_path):
+def test_the_answer_is_the_transform_that_was_measured(hecbench, tmp_path):
     recording = conformance.rig(np.random.default_rng(5), Mounting.EYE_TO_HAND)
     recording_io.save(recording.without_truth(), tmp_path / "cell")
     estimates = json.loads(hecbench("solve", tmp_path / "cell", "--solver", "park", "--json").stdout)
