@@ -29,6 +29,16 @@ class ScriptError(Exception):
     """A run-time error of the program on the controller (a pose out of reach): the program dies."""
 
 
+def pose_of(vector: Array) -> Array:
+    """Transform (4, 4) of the maker's pose vector (6,): metres and rotation vector."""
+    return se3.from_rotvec(vector[3:6], vector[:3])
+
+
+def vector_of(a_T_b: Array) -> Array:
+    """The maker's pose vector (6,) of a transform (4, 4)."""
+    return np.concatenate([a_T_b[:3, 3], se3.so3_log(a_T_b[:3, :3])])
+
+
 class SimulatedArm:
     """State of one arm between cycles. Times are the controller's own, which may run faster than the wall."""
 
@@ -38,6 +48,8 @@ class SimulatedArm:
         self.joint_speeds = np.zeros(6)
         self.flange_T_tcp = np.eye(4)
         self.tcp_offset = np.zeros(6)
+        self._seen: tuple[Array | None, Array | None] = (None, None)
+        self._tcp_vector: list[float] = []
         self.wrench = np.zeros(6)
         self.time_s = 0.0
         self.dt_s = 0.002
@@ -90,6 +102,16 @@ class SimulatedArm:
     def base_T_tcp(self) -> Array:
         """Pose of the tool centre point (4, 4)."""
         return np.asarray(self.arm.forward(self.joints) @ self.flange_T_tcp)
+
+    @property
+    def tcp_vector(self) -> list[float]:
+        """The same as the maker's pose vector; computed again only after a change, for it is asked each cycle."""
+        if self._seen[0] is not self.joints or self._seen[1] is not self.flange_T_tcp:
+            self._seen, self._tcp_vector = (
+                (self.joints, self.flange_T_tcp),
+                vector_of(self.base_T_tcp).tolist(),
+            )
+        return self._tcp_vector
 
     def solve(self, base_T_tcp: Array, near_rad: ArrayLike) -> Array:
         """The joints (6,) nearest to `near_rad`; raises `ScriptError` when there are none."""

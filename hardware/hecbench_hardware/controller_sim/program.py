@@ -13,9 +13,8 @@ from typing import Final
 
 import numpy as np
 
-from hecbench import se3
 from hecbench.se3 import Array
-from hecbench_hardware.controller_sim.arm import Motion, ScriptError, SimulatedArm
+from hecbench_hardware.controller_sim.arm import Motion, ScriptError, SimulatedArm, pose_of, vector_of
 from hecbench_hardware.controller_sim.signals import RobotMode, RuntimeState, SafetyMode
 
 READY, DONE = 1, 2
@@ -29,16 +28,6 @@ _STEADY_RAD_S = 1e-6
 _NUMBER = r"[-+0-9.eE]+"
 _MOVE = re.compile(rf"move([jlp])\((p?)\[([^\]]*)\],\s*a=({_NUMBER}),\s*v=({_NUMBER})")
 _HAND_SPEED_RAD_S, _HAND_ACCELERATION_RAD_S2 = 0.5, 5.0
-
-
-def pose_of(vector: Array) -> Array:
-    """Transform (4, 4) of the maker's pose vector (6,): metres and rotation vector."""
-    return se3.from_rotvec(vector[3:6], vector[:3])
-
-
-def vector_of(a_T_b: Array) -> Array:
-    """The maker's pose vector (6,) of a transform (4, 4)."""
-    return np.concatenate([a_T_b[:3, 3], se3.so3_log(a_T_b[:3, :3])])
 
 
 class ProgramRunner:

@@ -6,7 +6,7 @@ import struct
 from collections.abc import Mapping, MutableMapping, Sequence
 from dataclasses import dataclass, field
 
-from hecbench_hardware.controller_sim.program import OUTPUT_SHIFT, ProgramRunner, vector_of
+from hecbench_hardware.controller_sim.program import OUTPUT_SHIFT, ProgramRunner
 from hecbench_hardware.controller_sim.signals import (
     FORMATS,
     INPUTS,
@@ -154,7 +154,7 @@ def output_values(program: ProgramRunner) -> Values:
     """Every output of the controller in this cycle. What the simulation does not have is constant."""
     arm = program.arm
     playing = program.runtime is RuntimeState.PLAYING
-    pose, joints = vector_of(arm.base_T_tcp).tolist(), arm.joints.tolist()
+    pose, joints = arm.tcp_vector, arm.joints.tolist()
     speeds = arm.joint_speeds.tolist()
     return {
         **_CONSTANT,
