@@ -81,6 +81,7 @@ def record(
     from hecbench import recording_io
     from hecbench.specs import Kind
     from hecbench_hardware.arming import take_control
+    from hecbench_hardware.devices import FollowsRobot
     from hecbench_hardware.recorder.record import Recorder
 
     if freedrive and (poses is not None or dry_run):
@@ -95,6 +96,8 @@ def record(
             open_devices.callback(eye.close)
         device = _open(Kind.ROBOT, robot, given["robot"] | {k: v for k, v in extra.items() if v is not None})
         open_devices.callback(device.close)
+        if isinstance(eye, FollowsRobot):
+            eye.follow(device)
         what = "guided by hand"
         if not freedrive:
             plan, what = _checked(plan, device, out, poses, seed, dry_run)

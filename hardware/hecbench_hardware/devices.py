@@ -10,7 +10,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,7 @@ class Fault(StrEnum):
     LINK_LOST = "link_lost"
     STALE = "stale"
     LOCAL_MODE = "local_mode"
+    BUSY = "busy"
     PROGRAM_ENDED = "program_ended"
     FORCE = "force"
     LATE = "late"
@@ -49,6 +50,7 @@ CURES = {
     Fault.LINK_LOST: "check the cable and that the controller is on",
     Fault.STALE: "check the network and the load of this computer",
     Fault.LOCAL_MODE: "switch the pendant to remote control",
+    Fault.BUSY: "stop the other program or client first",
     Fault.PROGRAM_ENDED: "the target may be out of reach or beyond a singularity: see the pendant's log",
     Fault.FORCE: "find what the tool pushes against",
     Fault.LATE: "check the speed slider and what holds the arm back",
@@ -196,6 +198,15 @@ class Frame:
     """The camera's own clock, when it has one."""
     source: str
     """Which frame of which device or file."""
+
+
+@runtime_checkable
+class FollowsRobot(Protocol):
+    """A camera that draws its pictures, and so must be shown the arm that is in them."""
+
+    def follow(self, robot: Robot) -> None:
+        """Draw this robot from now on."""
+        ...
 
 
 class Camera(Protocol):

@@ -184,7 +184,7 @@ def test_speed_slider_is_set_and_set_back(connect, controller, ready_pose):
     ("verbs", "fault"),
     [
         (["local_mode"], Fault.LOCAL_MODE),
-        (["program"], Fault.PROGRAM_ENDED),
+        (["program"], Fault.BUSY),
         (["protective_stop"], Fault.PROTECTIVE_STOP),
         (["emergency_stop"], Fault.EMERGENCY_STOP),
         (["emergency_stop", "release_emergency_stop"], Fault.POWER_OFF),

@@ -95,19 +95,22 @@ class Recorder:
         if self.camera is None:
             self._session.append(_line(sample_id, before))
             return
-        frames = [self.camera.grab() for _ in range(self.frames)]
-        after = self.robot.state()
-        joint_change = float(np.abs(after.joints_rad - before.joints_rad).max())
+        frames, states = [], []
+        for _ in range(self.frames):
+            frames.append(self.camera.grab())
+            states.append(self.robot.state())
+        joints = np.array([state.joints_rad for state in states])
+        joint_change = float(np.abs(joints - before.joints_rad).max())
         if joint_change > _STILL_RAD:
             raise DeviceFault(
                 Fault.LATE, self.robot.name, f"moved {joint_change:.5f} rad during the exposure"
             )
         images = [frame.image for frame in frames]
         average = _average(images, self.camera.name, self.cell)
-        line = _line(sample_id, before)
-        line.joints_rad = (0.5 * (before.joints_rad + after.joints_rad)).tolist()
+        line = _line(sample_id, states[-1])
+        line.joints_rad = joints.mean(axis=0).tolist()
         line.joint_change_rad = joint_change
-        line.robot_stamp_s = 0.5 * (before.host_stamp_s + after.host_stamp_s)
+        line.robot_stamp_s = float(np.mean([state.host_stamp_s for state in states]))
         line.camera_stamp_s = float(np.mean([frame.host_stamp_s for frame in frames]))
         line.camera_clock_s = frames[-1].camera_stamp_s
         line.frames = [frame.source for frame in frames]
@@ -126,6 +129,7 @@ class Recorder:
             self.cell,
             name=self.folder.resolve().name,
             sample_ids=tuple(ids),
+            camera=self.cell.camera or (None if self.camera is None else self.camera.intrinsics()),
             robot=replace(description, joint_names=description.joint_names or JOINT_NAMES),
             joints_rad=np.array([line.joints_rad for line in lines]),
             base_T_flange=np.array([line.base_T_flange for line in lines]),

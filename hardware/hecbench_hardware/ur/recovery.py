@@ -24,17 +24,13 @@ def refuse_unready(device: str, dashboard: Dashboard, sample: Sample) -> None:
     if not dashboard.is_remote():
         raise DeviceFault(Fault.LOCAL_MODE, device, "the pendant is in local control")
     if sample.playing:
-        raise DeviceFault(
-            Fault.PROGRAM_ENDED,
-            device,
-            "another program or client is running there, stop it on the pendant first",
-        )
+        raise DeviceFault(Fault.BUSY, device, "another program or client is running there")
 
 
 def explained(device: str, words: str) -> DeviceFault:
     """The client library's refusal as a named fault."""
     if "in use" in words:
-        return DeviceFault(Fault.LINK_LOST, device, "another client controls it, close that one first")
+        return DeviceFault(Fault.BUSY, device, "another client controls it")
     if "remote" in words:
         return DeviceFault(Fault.LOCAL_MODE, device, "the pendant is in local control")
     return DeviceFault(Fault.LINK_LOST, device, words.splitlines()[0] if words else "the client refused")
