@@ -23,6 +23,8 @@ Array = NDArray[np.float64]
 DEFAULT_NOISE = Noise(0.3, float(np.deg2rad(0.05)), 5e-4)
 """A corner, and a good arm: px, rad, m."""
 _STARTS = 2
+_EXPLAINS = 0.2
+"""Of the target's motion in the image that may remain; good data leave a few per cent."""
 _AGREEING_RAD = np.deg2rad(8.0)
 
 
@@ -75,7 +77,7 @@ def adjust_with_exact_robot(recording: Recording, problem: Problem) -> Solution:
 
     Raises:
         Refusal: no method gives a start.
-        SolverFailure: what is left is as large as the target's own motion in the image.
+        SolverFailure: what is left is not small against the target's own motion in the image.
     """
     noise = Noise(DEFAULT_NOISE.observed)
     starts = sorted(_starts(recording, problem), key=lambda state: linearise(problem, state, noise).cost)
@@ -83,12 +85,12 @@ def adjust_with_exact_robot(recording: Recording, problem: Problem) -> Solution:
         raise Refusal("neither single3d nor shah gives a start on this recording")
     found = [adjust(problem, state, noise) for state in starts[:_STARTS]]
     best = min(found, key=lambda solution: solution.at.cost)
-    left_px = rms_px(problem, best)
+    left_px = float(np.median(np.linalg.norm(best.at.residuals[problem.seen], axis=1)))
     centres_px = np.nanmean(problem.observed, axis=1)
-    moved_px = float(np.sqrt(((centres_px - centres_px.mean(0)) ** 2).sum(1).mean()))
-    if left_px >= moved_px:
+    moved_px = float(np.median(np.linalg.norm(centres_px - np.median(centres_px, axis=0), axis=1)))
+    if left_px > _EXPLAINS * moved_px:
         raise SolverFailure(
-            f"leaves {left_px:.3g} px rms where the target moved by {moved_px:.3g}: "
+            f"leaves {left_px:.3g} px in the median where the target moved by {moved_px:.3g}: "
             "are the robot poses inverted, or the mounting wrong?"
         )
     return best

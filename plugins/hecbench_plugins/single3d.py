@@ -24,10 +24,11 @@ from hecbench_plugins.target_poses import target_poses
 
 Array = NDArray[np.float64]
 
-COPLANAR_CONDITION = 1e3
-"""Above it the marker positions nearly lie in a plane, and the closed form means nothing; healthy is 5."""
+COPLANAR_CONDITION = 300.0
+"""Above it the marker positions nearly lie in a plane and the closed form is off by decimetres; healthy is 5."""
 _MAX_ITERATIONS = 100
-_CONVERGED_STEP = 1e-12
+_CONVERGED_STEP = 1e-11
+_ROUNDING = 1e-13
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,17 +154,16 @@ def _cost(e: Eliminated, rotation: Array) -> float:
 
 
 def _descend(e: Eliminated, rotation: Array) -> tuple[Array, int]:
-    """Gauss-Newton from a start; a step that would raise the cost is halved."""
+    """Gauss-Newton from a start; a step that would raise the cost, beyond rounding, is halved."""
     for iteration in range(1, _MAX_ITERATIONS + 1):
         F = np.stack([_vec(rotation @ generator) for generator in se3.hat(np.eye(3))], 1)
         step = np.linalg.lstsq(F.T @ e.A @ F, F.T @ (e.b - e.A @ _vec(rotation)), rcond=None)[0]
-        while np.linalg.norm(step) > _CONVERGED_STEP and (
-            _cost(e, rotation @ se3.so3_exp(step)) > _cost(e, rotation)
-        ):
+        here = _cost(e, rotation)
+        while _cost(e, rotation @ se3.so3_exp(step)) > here + _ROUNDING * abs(here):
             step = step / 2
-        if np.linalg.norm(step) <= _CONVERGED_STEP:
-            return rotation, iteration
         rotation = se3.nearest_rotation(rotation @ se3.so3_exp(step))
+        if np.linalg.norm(step) < _CONVERGED_STEP:
+            return rotation, iteration
     return rotation, _MAX_ITERATIONS
 
 

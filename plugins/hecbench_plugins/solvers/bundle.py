@@ -5,7 +5,7 @@ adjustment in which robot poses are corrected and the noise of corners and robot
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -79,8 +79,10 @@ class Bundle:
         solution = adjust_with_noise(problem, first, self._noise(), self._known())
         if not self.intrinsics:
             return answer(problem, solution)
-        fx, fy, cx, cy, *distortion = solution.state.parameters.tolist()
-        return answer(problem, solution, K=[[fx, 0, cx], [0, fy, cy], [0, 0, 1]], distortion=distortion)
+        fx, fy, cx, cy = solution.state.parameters[:4]
+        K, distortion = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]]), solution.state.parameters[4:]
+        found = answer(problem, solution, K=K.tolist(), distortion=distortion.tolist())
+        return replace(found, camera=replace(camera, K=K, distortion=distortion))
 
     def _known(self) -> tuple[bool, bool, bool]:
         return (
