@@ -21,7 +21,6 @@ from hecbench import files
 from hecbench.errors import HecbenchError, InputError
 
 FILE_NAME = "trials.jsonl"
-SCHEMA = "hecbench.trial/1"
 
 Key = tuple[str, str, str, str, int, float, int]
 
@@ -37,7 +36,7 @@ class Outcome(StrEnum):
 class TrialRecord(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
     """One trial. Lengths are millimetres, as the names say."""
 
-    schema: Literal["hecbench.trial/1"] = SCHEMA
+    schema: Literal["hecbench.trial/1"] = "hecbench.trial/1"
     task: str
     robot: str
     """Arm and cell."""

@@ -22,6 +22,8 @@ _GRASP_HEIGHT_M = 0.040
 _GRASP_STROKE_M = 0.100
 _INSERTION_DEPTH_M = 0.040
 _INSERTION_STROKE_M = 0.090
+HALF_TURN = se3.from_rotvec([0.0, 0.0, np.pi], np.zeros(3))
+"""Gripper and peg are the same after half a turn about their own axis."""
 _DOWN = np.array([[1.0, 0, 0], [0, -1, 0], [0, 0, -1]])
 
 
@@ -71,7 +73,8 @@ def final_tolerances_mm(task: Task, workpiece_T_tool: Array, gripper: Gripper) -
     across_offset = abs(se3.inverse(block_T_tool)[1, 3])
     across = min(half_y + gripper.pad_half_width_m - across_offset, 2 * gripper.pad_half_width_m)
     between = gripper.opening_m / 2 + half_x - abs(se3.inverse(block_T_tool)[0, 3])
-    turn_rad = float(se3.rotation_angle(_DOWN.T @ block_T_tool[:3, :3]))
+    turns = np.stack([_DOWN.T, HALF_TURN[:3, :3] @ _DOWN.T]) @ block_T_tool[:3, :3]
+    turn_rad = float(se3.rotation_angle(turns).min())
     tolerances = {
         "overlap along the fingers": 1e3 * (along - LEAST_OVERLAP_M),
         "overlap across the fingers": 1e3 * (across - LEAST_OVERLAP_M),
@@ -104,7 +107,7 @@ def closed_form(
         tolerances["floor of the hole"] = 1e3 * (solids.HOLE_DEPTH_M - _peg_depth_m(workpiece_T_tool))
     else:
         tool_T_block = se3.inverse(workpiece_T_tool) @ se3.make(np.eye(3), solids.BLOCK_CENTRE_M)
-        yaw = float(np.arctan2(tool_T_block[1, 0], tool_T_block[0, 0]))
+        yaw = float(np.arctan(tool_T_block[1, 0] / tool_T_block[0, 0]))
         width = solids.BLOCK_HALF_M[0] / np.cos(yaw) + gripper.finger_half_width_m * abs(np.tan(yaw))
         beside = gripper.opening_m / 2 - abs(float(tool_T_block[0, 3])) - width
         tolerances["room between the fingers"] = 1e3 * beside

@@ -20,6 +20,8 @@ from hecbench_hardware.trials.cell import Calibration, NotSeen, Stroke, TrialCel
 from hecbench_hardware.trials.tasks import Task
 
 _COLLISIONS = {Fault.PROTECTIVE_STOP, Fault.FORCE}
+_ARRIVED_M = 1e-3
+_LOOKS, _LOOK_S = 20, 0.01
 _MOTIONS = {"approach", "act", "retreat"}
 
 
@@ -112,9 +114,9 @@ class Trial:
                 cell.gripper.open_fingers()
             self._go(lambda: robot.move_joints(joints))
         with self._in(State.ACT):
-            before = robot.settle().base_T_flange
+            before = self._arrived(self._flange(start))
             self._go(lambda: robot.move_linear(self._flange(end)))
-            reached = robot.settle().base_T_flange
+            reached = self._arrived(self._flange(end))
             if self.task is Task.GRASP:
                 cell.gripper.close_fingers()
             closed = cell.gripper.status()
@@ -125,7 +127,8 @@ class Trial:
         self.state = State.DONE
         verdict = cell.judge(self.task, stroke, self.clearance_m)
         record.outcome = Outcome.SUCCESS if verdict.success else Outcome.FAILURE
-        record.reason, record.margin_mm = verdict.reason, verdict.margin_mm
+        record.reason = verdict.reason
+        record.margin_mm = None if np.isnan(verdict.margin_mm) else verdict.margin_mm
         if (truth := cell.truth()) is not None:
             formula = tasks.closed_form(
                 self.task, se3.inverse(truth[0]) @ path[-1], cell.shape, self.clearance_m
@@ -147,17 +150,28 @@ class Trial:
         except InputError as error:
             raise OutOfReach(str(error)) from None
 
+    def _arrived(self, base_T_flange: Array) -> Array:
+        """The flange pose (4, 4) at rest, once it is the commanded one; a state may be older than the motion."""
+        for attempt in range(_LOOKS):
+            try:
+                here = self.cell.robot.settle().base_T_flange
+            except DeviceFault as error:
+                if error.fault is not Fault.OFF_TARGET or attempt + 1 == _LOOKS:
+                    raise
+                continue
+            gap_m = float(se3.translation_error_m(here, base_T_flange))
+            if gap_m < _ARRIVED_M:
+                return here
+            time.sleep(_LOOK_S)
+        raise DeviceFault(Fault.OFF_TARGET, self.cell.robot.name, f"the flange is {1e3 * gap_m:.1f} mm off")
+
     def _flange(self, base_T_tool: Array) -> Array:
         return np.asarray(base_T_tool @ se3.inverse(self.cell.shape.flange_T_tool))
 
     def _reach(self, end: Array) -> tuple[Array, Array]:
-        """Joints (6,) rad at the start of the stroke, and the end pose turned the way that is nearest to home.
-
-        Gripper and peg are the same after half a turn.
-        """
+        """Joints (6,) rad at the start of the stroke, and the end pose turned the way that is nearest to home."""
         found = []
-        for half_turns in (0, 1):
-            turned = end @ se3.from_rotvec([0.0, 0.0, np.pi * half_turns], np.zeros(3))
+        for turned in (end, end @ tasks.HALF_TURN):
             start = self._flange(tasks.above(turned, tasks.stroke_m(self.task)))
             for joints in self.cell.robot.arm.inverse(start, self.cell.home_rad)[:1]:
                 found.append((float(np.abs(joints - self.cell.home_rad).max()), joints, turned))

@@ -1,0 +1,109 @@
+"""The camera of the virtual lab: any size, optics and noise, following whatever arm it is shown."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hecbench import se3
+from hecbench.errors import InputError
+from hecbench.recording import CameraModel
+from hecbench.registry import hookimpl
+from hecbench.se3 import Array
+from hecbench.specs import DeviceSpec, Kind
+from hecbench_hardware.devices import Frame, Robot
+from hecbench_hardware.options import number, text
+from hecbench_hardware.trials import solids
+
+
+class LabCamera:
+    """Draws the lab as it is at the moment: `follow` a robot, real, simulated or the lab's own."""
+
+    def __init__(self, eye: Any, base_T_camera: Array, home_rad: Array, seed: int = 0) -> None:
+        """`eye` draws; `base_T_camera` (4, 4) is where it stands."""
+        self.name = "camera lab"
+        self.eye = eye
+        self.base_T_camera = base_T_camera
+        self.base_T_workpiece: Array | None = None
+        self._home_rad = home_rad
+        self._robot: Robot | None = None
+        self._rng = np.random.default_rng(seed)
+        self._count = 0
+
+    def follow(self, robot: Robot) -> None:
+        """Draw the arm where this robot says that it is."""
+        self._robot = robot
+
+    def joints_rad(self) -> Array:
+        """(6,) of the arm in the picture."""
+        return self._home_rad if self._robot is None else self._robot.state().joints_rad
+
+    def grab(self, timeout_s: float = 2.0) -> Frame:
+        """The picture now."""
+        self.eye.scene.place(self.joints_rad(), self.base_T_workpiece)
+        image = self.eye.image(self.base_T_camera, self._rng, self._tag_m())
+        self._count += 1
+        return Frame(image, time.time(), None, f"lab {self._count:06d}")
+
+    def _tag_m(self) -> Array | None:
+        """The corners of the workpiece's tag (4, 3) m in the base, which deserve the finest pixels."""
+        if self.base_T_workpiece is None:
+            return None
+        base_T_tag = self.base_T_workpiece @ solids.workpiece_T_tag()
+        return se3.transform_points(base_T_tag, solids.TAG.points_m)
+
+    def intrinsics(self) -> CameraModel | None:
+        """Exactly what it draws with."""
+        camera: CameraModel = self.eye.camera
+        return camera
+
+    def close(self) -> None:
+        """Give the graphics back."""
+        self.eye.close()
+
+
+def open_camera(options: Mapping[str, str]) -> LabCamera:
+    """The camera of one of the lab's calibrations."""
+    from hecbench import recording_io
+    from hecbench_hardware.lab import cells
+    from hecbench_hardware.lab.eye import Eye, Sensor
+    from hecbench_hardware.lab.scene import Scene
+
+    station = cells.station(options.get("arm", "ur5e"), options.get("urdf"))
+    calibration = int(number(options, "calibration", 0))
+    model = cells.camera_model(int(number(options, "width", 2448)), int(number(options, "height", 2048)))
+    if "cell" in options:
+        given = recording_io.load(Path(text(options, "cell"))).camera
+        if given is None or given.K is None:
+            raise InputError(f"cell={options['cell']}: has no camera with K to draw with")
+        model = given
+    sensor = Sensor(int(number(options, "supersample", 2)), number(options, "noise", 0.0))
+    scene = Scene(
+        station.robot,
+        joint_names=station.joint_names,
+        base_link=station.base_link,
+        flange_link=station.flange_link,
+        gripper=None if station.draws_gripper_meshes else station.gripper,
+        flange_tag=station.flange_tag(calibration),
+        surroundings=station.surroundings,
+    )
+    seed = int(number(options, "seed", 0))
+    return LabCamera(Eye(scene, model, sensor), station.camera_pose(calibration), station.home_rad, seed)
+
+
+@hookimpl
+def hecbench_cameras() -> Iterable[DeviceSpec]:
+    """The camera."""
+    yield DeviceSpec(
+        name="lab",
+        kind=Kind.CAMERA,
+        summary="the virtual lab's camera; it draws the arm wherever the robot of the recording is",
+        imports=("mujoco",),
+        open=open_camera,
+        simulated=True,
+        options=("arm", "urdf", "calibration", "cell", "width", "height", "supersample", "noise", "seed"),
+    )

@@ -1,0 +1,88 @@
+"""The lab as a place for trials: the workpiece stands where it is put, and geometry judges."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hecbench import se3
+from hecbench.recording import CameraModel
+from hecbench.se3 import Array
+from hecbench_hardware import tags
+from hecbench_hardware.cameras.lab import LabCamera
+from hecbench_hardware.devices import Robot
+from hecbench_hardware.lab.arm import LabGripper
+from hecbench_hardware.lab.cells import Station
+from hecbench_hardware.lab.eye import Eye, Sensor
+from hecbench_hardware.lab.scene import Scene
+from hecbench_hardware.trials import solids, sweep
+from hecbench_hardware.trials.cell import Calibration, NotSeen, Stroke
+from hecbench_hardware.trials.tasks import Task, Verdict
+
+
+def lab_camera(station: Station, model: CameraModel, sensor: Sensor, seed: int) -> LabCamera:
+    """A camera that sees the workpiece and the arm."""
+    scene = Scene(
+        station.robot,
+        joint_names=station.joint_names,
+        base_link=station.base_link,
+        flange_link=station.flange_link,
+        gripper=None if station.draws_gripper_meshes else station.gripper,
+        workpiece=True,
+        surroundings=station.surroundings,
+    )
+    eye = Eye(scene, model, sensor, whole=False)
+    return LabCamera(eye, station.camera_pose(0), station.home_rad, seed)
+
+
+class LabCell:
+    """Any robot whose arm is the station's: the lab's own, or a real driver on a simulated controller."""
+
+    places = 3
+
+    def __init__(self, station: Station, robot: Robot, camera: LabCamera | None) -> None:
+        """Without a camera the pose of the tag is exact."""
+        self.station, self.robot, self.camera = station, robot, camera
+        self.name = station.name
+        self.shape, self.home_rad = station.gripper, station.home_rad
+        self.gripper = LabGripper(
+            f"gripper lab {self.shape.name}", self.shape.opening_m, 2 * solids.BLOCK_HALF_M[0]
+        )
+        self.gripper.holds = self._block_between_pads
+        self._workpiece = station.workpiece_pose(0)
+        self._camera_pose = station.camera_pose(0)
+        if camera is not None:
+            camera.follow(robot)
+
+    def prepare(self, calibration: Calibration, place: int) -> None:
+        """Put the workpiece at a place and the camera where the calibration was made."""
+        self._workpiece = self.station.workpiece_pose(place)
+        self._camera_pose = self.station.camera_pose(calibration.number)
+        if self.camera is not None:
+            self.camera.base_T_workpiece = self._workpiece
+            self.camera.base_T_camera = self._camera_pose
+
+    def locate(self) -> Array:
+        """From the picture, or the truth where nothing is drawn."""
+        if self.camera is None:
+            return self.truth()[1]
+        model = self.camera.intrinsics()
+        assert model is not None
+        try:
+            return tags.locate(self.camera.grab().image, model, solids.TAG).camera_T_tag
+        except tags.TagRefused as refusal:
+            raise NotSeen(str(refusal)) from None
+
+    def judge(self, task: Task, stroke: Stroke, clearance_m: float) -> Verdict:
+        """By the contact sweep along the true path."""
+        return sweep.judge(task, se3.inverse(self._workpiece) @ stroke.base_T_tool, self.shape, clearance_m)
+
+    def truth(self) -> tuple[Array, Array]:
+        """base_T_workpiece and camera_T_tag (4, 4) m."""
+        return self._workpiece, np.asarray(
+            se3.inverse(self._camera_pose) @ self._workpiece @ solids.workpiece_T_tag()
+        )
+
+    def _block_between_pads(self) -> bool:
+        tool = self.robot.state().base_T_flange @ self.shape.flange_T_tool
+        end = se3.inverse(self._workpiece) @ tool
+        return sweep.judge(Task.GRASP, end[None], self.shape).success

@@ -1,0 +1,54 @@
+"""The arm of the virtual lab as a device; the suite of recordings that are made there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from hecbench.registry import hookimpl
+from hecbench.specs import DeviceSpec, Kind, SuiteSpec
+
+MARKERS, VIEWS = "markers", "views"
+
+
+def open_lab(options: Mapping[str, str]) -> Any:
+    """The arm, in its home pose."""
+    from hecbench_hardware.lab.arm import LabRobot
+    from hecbench_hardware.lab.cells import station
+
+    return LabRobot(station(options.get("arm", "ur5e"), options.get("urdf")))
+
+
+def make(level: str, index: int, seed: int) -> Any:
+    """One recording of the suite, drawn now."""
+    from hecbench_hardware.lab import recordings
+
+    maker = recordings.marker_recording if level == MARKERS else recordings.view_recording
+    return maker(index, seed)
+
+
+@hookimpl
+def hecbench_robots() -> Iterable[DeviceSpec]:
+    """The arm."""
+    yield DeviceSpec(
+        name="lab",
+        kind=Kind.ROBOT,
+        summary="the arm of the virtual lab, driven directly",
+        imports=("mujoco",),
+        open=open_lab,
+        simulated=True,
+        options=("arm", "urdf"),
+    )
+
+
+@hookimpl
+def hecbench_suites() -> Iterable[SuiteSpec]:
+    """Marker calibrations and pictures of the arm."""
+    yield SuiteSpec(
+        name="lab",
+        summary="drawn in the virtual lab: 10 poses with a tag on the flange, or 10 configurations with masks",
+        imports=("mujoco",),
+        levels=(MARKERS, VIEWS),
+        default_samples=18,
+        make=make,
+    )

@@ -1,0 +1,195 @@
+"""The pose of an object from its AprilTag: detection, both planar solutions, refinement, covariance, refusals.
+
+Detection: pupil-apriltags (Wang and Olson 2016, "AprilTag 2: efficient and robust fiducial detection"), whose
+pixel centres lie at half integers; ours and OpenCV's lie at integers. Planar pose: Collins and Bartoli 2014,
+"Infinitesimal plane-based pose estimation", both solutions, each refined on every edge between a black and a
+white cell of the tag (tag_edges.py): some hundred edge points instead of four corners.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hecbench import se3
+from hecbench.errors import InputError
+from hecbench.recording import CameraModel
+from hecbench.se3 import Array
+from hecbench.targets import AprilTagTarget
+from hecbench_hardware import tag_edges
+from hecbench_hardware.tag_edges import FAMILIES, TagRefused
+
+Grey = NDArray[np.uint8]
+
+_MOST_WRONG_BITS = 2
+_LEAST_MARGIN = 20.0
+_EDGE_PX = 2.0
+_LARGE_PX = 1000
+"""Larger pictures are first searched at half their size; the edges are measured at full size in any case."""
+_MOST_BLUR_CELLS = 0.6
+_MOST_BLUR_PX = 3.0
+_SAME_RAD = 1e-3
+_AMBIGUOUS = 1.5
+"""Ratio of the errors below which the second solution might be the right one."""
+
+
+@dataclass(frozen=True, eq=False)
+class TagPose:
+    """Where a tag is.
+
+    Attributes:
+        camera_T_tag: (4, 4) m; tag frame x right, y down, z into the tag.
+        covariance: (6, 6) of [phi rad, rho m] in ``T_true = exp([phi, rho]) @ camera_T_tag``.
+        error_px: rms distance of the tag's edges in the picture from where this pose puts them.
+        corners_px: (4, 2) bottom-left, bottom-right, top-right, top-left; pixel centres at integers.
+        other: the second planar solution and its error_px, None when there is none before the camera.
+        ambiguous: whether the second solution explains the picture nearly as well.
+    """
+
+    camera_T_tag: Array
+    covariance: Array
+    error_px: float
+    corners_px: Array
+    other: tuple[Array, float] | None
+    ambiguous: bool
+
+
+def locate(image: NDArray[np.uint8], camera: CameraModel, target: AprilTagTarget) -> TagPose:
+    """The pose of one tag in a picture (H, W, 3) RGB or (H, W) grey.
+
+    Raises:
+        TagRefused: not in the picture, twice, clipped, blurred, or of another family.
+        InputError: the camera has no intrinsics, or another size than the picture.
+    """
+    if camera.K is None:
+        raise InputError("the camera's intrinsics are unknown: give K")
+    if image.shape[:2] != (camera.height, camera.width):
+        raise InputError(
+            f"the picture is {image.shape[1]}x{image.shape[0]} px, the camera {camera.width}x{camera.height}:"
+            " give the camera that took it"
+        )
+    grey = _grey(image)
+    corners_px = _the_tag(grey, target)
+    _refuse_clipped(corners_px, camera)
+    _refuse_blurred(grey, corners_px, target)
+    found = []
+    for rough in planar_solutions(corners_px, camera, target):
+        refined = tag_edges.refined(grey, camera, target, rough)
+        if refined is not None:
+            found.append(refined)
+    if not found:
+        raise TagRefused(
+            "the tag's edges do not fit any pose: check the intrinsics and the tag's id and size"
+        )
+    found.sort(key=lambda fit: fit.error_px)
+    best, second = found[0], found[1] if len(found) > 1 else None
+    same = second is not None and _angle(best.camera_T_tag, second.camera_T_tag) < _SAME_RAD
+    if second is None or same:
+        return TagPose(best.camera_T_tag, best.covariance, best.error_px, corners_px, None, False)
+    ambiguous = second.error_px < _AMBIGUOUS * best.error_px
+    other = second.camera_T_tag, second.error_px
+    return TagPose(best.camera_T_tag, best.covariance, best.error_px, corners_px, other, ambiguous)
+
+
+def planar_solutions(corners_px: Array, camera: CameraModel, target: AprilTagTarget) -> list[Array]:
+    """Up to two camera_T_tag (4, 4) m before the camera that put the corners (4, 2) px near where they are."""
+    import cv2
+
+    intrinsics = camera.K, camera.distortion
+    points = target.points_m
+    _, rotvecs, shifts, _ = cv2.solvePnPGeneric(points, corners_px, *intrinsics, flags=cv2.SOLVEPNP_IPPE)
+    found = []
+    for first in zip(rotvecs, shifts, strict=True):
+        rotvec, shift = cv2.solvePnPRefineLM(points, corners_px, *intrinsics, *first)
+        camera_T_tag = se3.from_rotvec(rotvec[:, 0], shift[:, 0])
+        if np.isfinite(camera_T_tag).all() and camera_T_tag[2, 3] > 0:
+            found.append(camera_T_tag)
+    return found
+
+
+def _angle(first: Array, second: Array) -> float:
+    return float(se3.rotation_error_rad(first, second))
+
+
+def _grey(image: NDArray[np.uint8]) -> Grey:
+    import cv2
+
+    return np.ascontiguousarray(image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_RGB2GRAY))
+
+
+@cache
+def _detector(family: str, decimate: float) -> Any:
+    from pupil_apriltags import Detector
+
+    return Detector(families=family, nthreads=1, quad_decimate=decimate, refine_edges=1)
+
+
+def _detected(grey: Grey, family: str, decimate: float = 1.0) -> list[tuple[int, Array]]:
+    """Id and corners (4, 2) px of every credible tag of a family."""
+    return [
+        (int(tag.tag_id), np.asarray(tag.corners, float) - 0.5)
+        for tag in _detector(family, decimate).detect(grey)
+        if tag.hamming <= _MOST_WRONG_BITS and tag.decision_margin > _LEAST_MARGIN
+    ]
+
+
+def _the_tag(grey: Grey, target: AprilTagTarget) -> Array:
+    """The corners of the one tag of the target's family and id."""
+    if target.family not in FAMILIES:
+        raise InputError(f"target.family: '{target.family}' is not one of {', '.join(FAMILIES)}")
+    found: list[tuple[int, Array]] = []
+    same: list[Array] = []
+    for decimate in (2.0, 1.0) if max(grey.shape) > _LARGE_PX else (1.0,):
+        found = _detected(grey, target.family, decimate)
+        if same := [corners for tag_id, corners in found if tag_id == target.id]:
+            break
+    if len(same) > 1:
+        raise TagRefused(f"{len(same)} tags have id {target.id} of {target.family}: cover all but one")
+    if same:
+        return same[0]
+    seen = {f"{target.family} id {tag_id}" for tag_id, _ in found}
+    for family in FAMILIES:
+        if family != target.family:
+            seen |= {f"{family} id {tag_id}" for tag_id, _ in _detected(grey, family)}
+    wanted = f"{target.family} id {target.id}"
+    if seen:
+        raise TagRefused(f"{wanted} is not in the picture, but {', '.join(sorted(seen))}: name the right tag")
+    raise TagRefused(f"{wanted} is not in the picture: uncover it, turn it to the camera, light it evenly")
+
+
+def _refuse_clipped(corners_px: Array, camera: CameraModel) -> None:
+    limit = np.array([camera.width, camera.height]) - 1 - _EDGE_PX
+    if (corners_px < _EDGE_PX).any() or (corners_px > limit).any():
+        raise TagRefused("the tag touches the edge of the picture: move it or the camera")
+
+
+def _refuse_blurred(grey: Grey, corners_px: Array, target: AprilTagTarget) -> None:
+    """Refuse when the outer edges are as wide as a cell."""
+    width_px = edge_width_px(grey, corners_px)
+    cell_px = float(np.linalg.norm(np.diff(corners_px, axis=0), axis=1).min()) / FAMILIES[target.family]
+    if width_px > max(_MOST_BLUR_PX, _MOST_BLUR_CELLS * cell_px):
+        raise TagRefused(
+            f"the tag is blurred, its edges are {width_px:.1f} px wide: focus, expose shorter, stand still"
+        )
+
+
+def edge_width_px(grey: Grey, corners_px: Array) -> float:
+    """How wide the step from black to white is on the outer edges: contrast over steepest slope, median."""
+    import cv2
+
+    sides = []
+    reach = np.arange(-8.0, 8.01, 0.5)
+    along = np.linspace(0.2, 0.8, 13)[:, None]
+    for start, end in zip(corners_px, np.roll(corners_px, -1, axis=0), strict=True):
+        direction = (end - start) / np.linalg.norm(end - start)
+        normal = np.array([-direction[1], direction[0]])
+        points = (start + along * (end - start))[:, None] + reach[:, None] * normal
+        u, v = (points[..., i].astype(np.float32) for i in (0, 1))
+        profile = cv2.remap(grey, u, v, cv2.INTER_LINEAR).astype(float).mean(0)
+        slope = np.abs(np.diff(profile)).max() / 0.5
+        sides.append(np.ptp(profile) / max(slope, 1e-9))
+    return float(np.median(sides))
