@@ -98,7 +98,7 @@ def _samples(target: AprilTagTarget) -> tuple[Array, Array, Array, Array]:
                 normals.append(rise[row, column] * normal)
     grid = np.argwhere(np.ones_like(white))[:, ::-1] + 0.5
 
-    def metric(cells_xy: Array) -> Array:
+    def metric(cells_xy: NDArray[np.floating]) -> Array:
         return np.column_stack([(cells_xy - count / 2) * cell_m, np.zeros(len(cells_xy))])
 
     directions = np.column_stack([np.array(normals), np.zeros(len(normals))])

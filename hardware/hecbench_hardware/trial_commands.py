@@ -128,7 +128,7 @@ def _lab_cell(options: dict[str, Any], opened: ExitStack) -> tuple[TrialCell, li
     if options["offset_mm"] is not None:
         count, offset = station.calibrations, options["offset_mm"]
         found = calibrations.moved_truth(count, station.camera_pose, offset, options["seed"])
-        notes = []
+        notes: list[str] = []
     else:
         found, notes = calibrations.from_estimates(
             options["estimates"],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -18,6 +18,7 @@ from hecbench_hardware.lab.eye import Eye, Sensor
 from hecbench_hardware.lab.scene import FlangeTag, Scene
 
 _TRIES = 4000
+_SENSOR = Sensor(supersample=2, noise=2.0)
 _START_ERROR = np.array([0.05] * 3 + [0.08] * 3)
 _VIEW_SPREAD_RAD = np.deg2rad(10.0)
 
@@ -39,8 +40,8 @@ class MarkerSet:
     spread_deg: float = 25.0
     box_m: float = 0.3
     tag_m: float = 0.12
-    sensor: Sensor = Sensor(2, 2.0)
-    camera: CameraModel = camera_model()
+    sensor: Sensor = _SENSOR
+    camera: CameraModel = field(default_factory=camera_model)
 
 
 def marker_recording(
@@ -67,7 +68,7 @@ def marker_recording(
             try:
                 picture = eye.image(base_T_camera, rng, corners_m)
                 seen = tags.locate(picture, how.camera, carried.target)
-            except tags.TagRefused:
+            except tag_edges.TagRefused:
                 continue
             joints.append(candidate)
             corners.append(tag_edges.project(how.camera, seen.camera_T_tag, carried.target.points_m))
@@ -104,7 +105,7 @@ def view_recording(calibration: int, seed: int = 0, station: Station | None = No
 
 
 def with_pictures(
-    recording: Recording, station: Station, rng: np.random.Generator, sensor: Sensor = Sensor(2, 2.0)
+    recording: Recording, station: Station, rng: np.random.Generator, sensor: Sensor = _SENSOR
 ) -> Recording:
     """The recording with a picture and a mask of the arm for each of its samples, seen from its truth."""
     assert recording.camera is not None

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.recording import CameraModel
@@ -141,7 +142,7 @@ class Scene:
         self._view.flags[mujoco.mjtRndFlag.mjRND_IDCOLOR] = segmented
         return self._view
 
-    def is_robot(self, id_image: Array) -> Array:
+    def is_robot(self, id_image: NDArray[np.uint8]) -> NDArray[np.bool_]:
         """(H, W) True on the robot, from a segmented picture (H, W, 3)."""
         channels = id_image.astype(np.int32)
         segment = channels[..., 0] + (channels[..., 1] << 8) + (channels[..., 2] << 16)
@@ -275,7 +276,7 @@ def _room(spec: Any, surroundings: Surroundings) -> None:
     world.add_geom(type=plane, size=[6, 6, 1], pos=[0, 0, -0.8], material="pattern", **hidden)
     if not surroundings.clutter:
         return
-    wall = se3.to_quat_wxyz(se3.make([[0, 0, 1.0], [1, 0, 0], [0, 1, 0]], np.zeros(3)))
+    wall = se3.to_quat_wxyz(se3.make(np.array([[0, 0, 1.0], [1, 0, 0], [0, 1, 0]]), np.zeros(3)))
     world.add_geom(
         type=plane, size=[6, 6, 1], pos=[-_WALL_DISTANCE_M, 0, 1], quat=wall, material="pattern", **hidden
     )

@@ -9,11 +9,12 @@ from hecbench.recording import CameraModel
 from hecbench.se3 import Array
 from hecbench_hardware import tags
 from hecbench_hardware.cameras.lab import LabCamera
-from hecbench_hardware.devices import Robot
+from hecbench_hardware.devices import Gripper, Robot
 from hecbench_hardware.lab.arm import LabGripper
 from hecbench_hardware.lab.cells import Station
 from hecbench_hardware.lab.eye import Eye, Sensor
 from hecbench_hardware.lab.scene import Scene
+from hecbench_hardware.tag_edges import TagRefused
 from hecbench_hardware.trials import solids, sweep
 from hecbench_hardware.trials.cell import Calibration, NotSeen, Stroke
 from hecbench_hardware.trials.tasks import Task, Verdict
@@ -44,10 +45,11 @@ class LabCell:
         self.station, self.robot, self.camera = station, robot, camera
         self.name = station.name
         self.shape, self.home_rad = station.gripper, station.home_rad
-        self.gripper = LabGripper(
+        gripper = LabGripper(
             f"gripper lab {self.shape.name}", self.shape.opening_m, 2 * solids.BLOCK_HALF_M[0]
         )
-        self.gripper.holds = self._block_between_pads
+        gripper.holds = self._block_between_pads
+        self.gripper: Gripper = gripper
         self._workpiece = station.workpiece_pose(0)
         self._camera_pose = station.camera_pose(0)
         if camera is not None:
@@ -69,7 +71,7 @@ class LabCell:
         assert model is not None
         try:
             return tags.locate(self.camera.grab().image, model, solids.TAG).camera_T_tag
-        except tags.TagRefused as refusal:
+        except TagRefused as refusal:
             raise NotSeen(str(refusal)) from None
 
     def judge(self, task: Task, stroke: Stroke, clearance_m: float) -> Verdict:

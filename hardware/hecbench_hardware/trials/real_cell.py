@@ -10,6 +10,7 @@ from hecbench.recording import CameraModel
 from hecbench.se3 import Array
 from hecbench_hardware import tags
 from hecbench_hardware.devices import Camera, Gripper, Robot
+from hecbench_hardware.tag_edges import TagRefused
 from hecbench_hardware.trials import solids
 from hecbench_hardware.trials.cell import Calibration, NotSeen, Stroke
 from hecbench_hardware.trials.tasks import Task, Verdict
@@ -44,7 +45,7 @@ class RealCell:
         """From one picture."""
         try:
             return tags.locate(self._camera.grab().image, self._model, solids.TAG).camera_T_tag
-        except tags.TagRefused as refusal:
+        except TagRefused as refusal:
             raise NotSeen(str(refusal)) from None
 
     def judge(self, task: Task, stroke: Stroke, clearance_m: float) -> Verdict:
