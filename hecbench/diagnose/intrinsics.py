@@ -22,6 +22,8 @@ _SAME_RATIO = 0.05
 """Of the relative position of the principal point across and down; a crop seldom keeps both."""
 _SUSPICIOUS_PX = 4.0
 _SUSPICIOUS_SCALE = 0.02
+_SAME_SIZE = 0.1
+"""Deviation of the target's apparent size that the right intrinsics may leave."""
 _BY_SIZE = "use the intrinsics of the resolution the images were taken at, or scale fx, fy, cx, cy"
 
 
@@ -46,7 +48,10 @@ def examine(case: Case) -> tuple[Finding | None, Case]:
         or (fit is not None and abs(fit.state.scale - 1) > _SUSPICIOUS_SCALE)
     )
     if suspicious and case.recording.corners_px is not None and case.can_be_fitted:
-        best = min(_rescaled_fits(case, camera), key=lambda found: found[0], default=None)
+        plausible = (
+            found for found in _rescaled_fits(case, camera) if abs(found[2].state.scale - 1) < _SAME_SIZE
+        )
+        best = min(plausible, key=lambda found: found[0], default=None)
         if best is not None and best[2].relative < EXPLAINS and best[0] < _HALF * _angle(fit, camera.K[0, 0]):
             ratio, better = best[1], best[2]
             summary = (

@@ -54,20 +54,20 @@ def test_camera_derivatives(length, rng):
 
 @pytest.mark.parametrize("level", KNOWN)
 def test_covariance_is_calibrated(level):
-    """e^T C^-1 e of 60 rigs: chi-square with 6 degrees of freedom, whose mean over 60 has sigma 0.45."""
+    """e^T C^-1 e of 25 rigs: chi-square with 6 degrees of freedom, whose mean over 25 has sigma 0.7."""
     squares = []
-    for index in range(60):
+    for index in range(25):
         recording = make(level, index, 5)
         found = solved(KNOWN[level], recording)
         twist = se3.log(recording.truth_parent_T_camera @ se3.inverse(found.parent_T_camera))
         squares.append(twist @ np.linalg.solve(found.covariance, twist))
-    assert np.mean(squares) == pytest.approx(6.0, abs=1.4)
+    assert np.mean(squares) == pytest.approx(6.0, abs=2.1)
 
 
 def test_corrections_pay():
     """On boards the robot's errors dominate: correcting them beats taking the robot as exact."""
     with_corrections, without = [], []
-    for index in range(12):
+    for index in range(6):
         recording = make("board_2m_in_hand", index, 2)
         with_corrections.append(errors(solved(Bundle(), recording), recording)[0])
         without.append(errors(solved(bundle_fixed, recording), recording)[0])
