@@ -37,7 +37,7 @@ _METRES_BELOW = 10.0
 _RADIANS_BELOW = 2 * np.pi + 0.1
 _STILL = 0.3
 _CLEARLY_WORSE = 3.0
-_LEAST_SAMPLES = 3
+_LEAST_SAMPLES = 5
 _MOST_FITTED = 40
 _ANGLE_SLACK_RAD = np.deg2rad(3.0)
 
@@ -209,7 +209,12 @@ def prove(
         )
     candidates = list(_candidates(robot, target, mountings, told))
     documented = [c for c in candidates if c.deviations == 0]
-    if count < _LEAST_SAMPLES and len(documented) == 1:
+    if count < _LEAST_SAMPLES:
+        if len(documented) != 1:
+            raise InputError(
+                f"{source}: {count} samples cannot tell {len(documented)} possible readings apart; it takes "
+                f"{_LEAST_SAMPLES}, or say which is meant in {HINTS_NAME} beside it"
+            )
         return _proof(documented[0], f"{source}: read as {documented[0].name}; too few samples to prove it")
     limit = min(_STILL, _CLEARLY_WORSE * min(c.stillness.relative for c in candidates) + 0.01)
     still = [c for c in candidates if c.stillness.relative <= limit]
@@ -275,7 +280,9 @@ def _turns(poses: Array) -> Array:
 def stillness(hand: Array, camera_T_target: Array) -> Stillness:
     """How still the best constant X and Y hold the target, for hand poses (N, 4, 4) m.
 
-    X by Park and Martin 1994, eq. 12 and 20, over all pairs of at most 40 samples.
+    Relative is the larger of how still the target stands for the robot and how still the camera does, so
+    that turning both streams round changes nothing. X by Park and Martin 1994, eq. 12 and 20, over all pairs
+    of at most 40 samples.
     """
     chosen = np.unique(np.linspace(0, len(hand) - 1, min(len(hand), _MOST_FITTED)).astype(int))
     i, j = np.triu_indices(len(chosen), 1)
@@ -287,10 +294,15 @@ def stillness(hand: Array, camera_T_target: Array) -> Stillness:
     left = (A[:, :3, :3] - np.eye(3)).reshape(-1, 3)
     right = (B[:, :3, 3] @ rotation.T - A[:, :3, 3]).ravel()
     translation = np.linalg.lstsq(left, right, rcond=None)[0] if len(left) else np.zeros(3)
-    constant = inverse_hand @ se3.make(rotation, translation) @ camera_T_target
-    angle, distance = _rms_deviations(constant)
-    extent_angle, extent = _rms_deviations(camera_T_target)
-    relative = max(angle / max(extent_angle, 1e-9), distance / max(extent, 1e-9))
+    target_T_camera = se3.inverse(camera_T_target)
+    other_T_target = inverse_hand @ se3.make(rotation, translation) @ camera_T_target
+    parent_T_camera = hand @ se3.mean(other_T_target) @ target_T_camera
+    angle, distance = _rms_deviations(other_T_target)
+    relative = max(
+        deviation / max(extent, 1e-9)
+        for constant, moving in ((other_T_target, camera_T_target), (parent_T_camera, target_T_camera))
+        for deviation, extent in zip(_rms_deviations(constant), _rms_deviations(moving), strict=True)
+    )
     return Stillness(float(np.rad2deg(angle)), 1e3 * distance, relative)
 
 

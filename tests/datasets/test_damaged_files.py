@@ -17,7 +17,7 @@ FOLDERS = {
     "industrial_10x10/test_set_10x10": "industrial",
     "ctrnet_baxter": "ctrnet",
 }
-MUTATIONS = 25
+MUTATIONS = 12
 
 
 def damage(content, rng):

@@ -113,10 +113,31 @@ def test_documented_but_mixed_up_pairs_are_kept_and_said(poses):
     assert "pairs mixed up" in proof.note
 
 
-def test_two_samples_prove_nothing(poses):
+def test_four_samples_prove_nothing(poses):
     mounting, robot, target = poses
-    proof = prove("x", readings(robot[:2], ROBOT), readings(target[:2], TARGET), [mounting])
+    proof = prove("x", readings(robot[:4], ROBOT), readings(target[:4], TARGET), [mounting])
     assert "too few samples" in proof.note
+    with pytest.raises(InputError, match="4 samples cannot tell 2 possible readings apart"):
+        prove("x", readings(robot[:4], ROBOT), readings(target[:4], TARGET), BOTH)
+
+
+@pytest.mark.parametrize("most_deg", [15, 60])
+def test_six_noisy_samples_of_any_cell_are_enough(most_deg):
+    rng = np.random.default_rng(8)
+    for mounting in BOTH * 4:
+        X, Y = se3.from_rotvec(rng.normal(0, 1.5, (2, 3)), rng.normal(0, 0.5, (2, 3)))
+        axes = rng.normal(size=(6, 3))
+        axes /= np.linalg.norm(axes, axis=1, keepdims=True)
+        turns = axes * np.deg2rad(rng.uniform(0, most_deg, (6, 1)))
+        target = se3.from_rotvec(turns, rng.normal([0, 0, 0.8], 0.08, (6, 3)))
+        target = target @ se3.from_rotvec(rng.normal(0, 1.5, 3), np.zeros(3))
+        hand = X @ target @ se3.inverse(Y)
+        robot = hand if mounting is Mounting.EYE_TO_HAND else se3.inverse(hand)
+        noise = rng.normal(0, 1, (6, 6)) * np.repeat([np.deg2rad(0.3), 1e-3], 3)
+        noisy = se3.exp(noise) @ target
+        check(prove("x", readings(robot, ROBOT), readings(noisy, TARGET), BOTH), (mounting, robot, noisy))
+        swapped = readings(quaternion(robot, "wxyz"), ROBOT, assumed_rotation="quat_xyzw")
+        check(prove("x", swapped, readings(noisy, TARGET), [mounting]), (mounting, robot, noisy))
 
 
 @pytest.mark.parametrize(
