@@ -23,7 +23,7 @@ def examine(case: Case) -> tuple[Finding | None, Case]:
     distance_m = abs(float(np.median(case.agreed[0].camera_T_target[:, 2, 3])))
     scale = np.repeat([distance_m, 1.0], 3)
     variances, directions = np.linalg.eigh(scale[:, None] * found.covariance() * scale)
-    condition = float(np.sqrt(variances[-1] / variances[0]))
+    condition = float(np.sqrt(variances[-1] / max(variances[0], 1e-12 * variances[-1])))
     expected_mm = found.expected_mm()
     summary = (
         f"expected error in the workspace {expected_mm:.2g} mm (one sigma); weakest is "

@@ -40,7 +40,9 @@ class Precision:
     def covariance(self, extra: Array | None = None) -> Array:
         """Of X (6, 6), with further information (12, 12) about [X, Y]."""
         total = self.information.sum(0) + (0.0 if extra is None else extra)
-        return np.asarray(np.linalg.inv(total)[:6, :6] * self.noise_factor**2)
+        scale = 1 / np.sqrt(np.diagonal(total))
+        inverse = np.linalg.pinv(scale[:, None] * total * scale, hermitian=True)
+        return np.asarray((scale[:, None] * inverse * scale)[:6, :6] * self.noise_factor**2)
 
     def expected_mm(self, extra: Array | None = None) -> float:
         """Rms displacement of the workspace points by the error of X, one sigma."""
