@@ -44,7 +44,7 @@ def _file(path: Path) -> Path | None:
 
 def _is_samples(content: str) -> bool:
     listed = "samples:" in content and "robot:" in content and any(f"{key}:" in content for key in _TRACKING)
-    return listed or all(f"{key}:" in content for key in _LISTS)
+    return listed or any(f"{key}:" in content for key in _LISTS)
 
 
 def sniff(path: Path) -> bool:

@@ -39,6 +39,7 @@ _ROBOT = re.compile(r"hand|robot|flange|gripper|effector|tool|base_ee", re.IGNOR
 _CAMERA = re.compile(r"cam|eye|target|marker|tag|board|tracking", re.IGNORECASE)
 _SUFFIXES = (".csv", ".txt", ".tum")
 _NANOSECONDS_ABOVE = 1e14
+_LONGEST_S = 1e5
 
 
 def _streams(path: Path) -> tuple[tuple[Path, str], tuple[Path, str]] | None:
@@ -137,6 +138,10 @@ def _read(file: Path, name: str) -> tuple[Array, Array]:
         raise InputError(f"{source}: {rows.shape[1]} numbers a row; expected t, x y z, qx qy qz qw")
     if np.abs(rows[:, 0]).max() > _NANOSECONDS_ABOVE:
         rows[:, 0] *= 1e-9
+    if np.ptp(rows[:, 0]) > _LONGEST_S:
+        raise InputError(
+            f"{source}: its stamps span {np.ptp(rows[:, 0]):.3g} s; give one recording, in s or ns"
+        )
     rows = rows[np.argsort(rows[:, 0], kind="stable")]
     return rows[:, 0], rows[:, 1:]
 

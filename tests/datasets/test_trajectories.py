@@ -86,6 +86,15 @@ def test_streams_of_other_days_are_refused(tmp_path, streams):
         trajectories.load(tmp_path)
 
 
+def test_a_stray_stamp_is_named(tmp_path, streams):
+    robot, camera, _ = streams
+    robot[0, 0] = -1.7e9
+    np.savetxt(tmp_path / "robot.csv", robot)
+    np.savetxt(tmp_path / "camera.csv", camera)
+    with pytest.raises(InputError, match=r"robot\.csv: its stamps span 1\.7e\+09 s"):
+        trajectories.load(tmp_path)
+
+
 def test_an_unfinished_line_is_named(tmp_path, streams):
     robot, camera, _ = streams
     np.savetxt(tmp_path / "robot.csv", robot)

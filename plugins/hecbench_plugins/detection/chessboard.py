@@ -25,24 +25,19 @@ def corners(grey: Grey, columns: int, rows: int) -> Array | None:
     """
     import cv2
 
+    criteria = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 50, 1e-3)
     for thorough in (0, cv2.CALIB_CB_EXHAUSTIVE):
         flags = cv2.CALIB_CB_NORMALIZE_IMAGE | thorough
         found, points = cv2.findChessboardCornersSB(grey, (columns, rows), flags=flags)
         if not found:
             continue
         window = _window(points.reshape(rows, columns, 2))
-        points = cv2.cornerSubPix(grey, points, (window, window), (-1, -1), _criteria())
+        points = cv2.cornerSubPix(grey, points, (window, window), (-1, -1), criteria)
         grid = unmirrored(np.asarray(points, float).reshape(rows, columns, 2))
         lightness = _first_square_lightness(grey, grid)
         if is_regular(grid) and abs(lightness) > _LEAST_CONTRAST:
             return (grid[::-1, ::-1] if (columns + rows) % 2 and lightness < 0 else grid).reshape(-1, 2)
     return None
-
-
-def _criteria() -> tuple[int, int, float]:
-    import cv2
-
-    return cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 50, 1e-3
 
 
 def _window(grid: Array) -> int:

@@ -26,7 +26,7 @@ def unmirrored(grid: Array) -> Array:
 
 
 def is_regular(grid: Array) -> bool:
-    """Whether the points (rows, columns, 2) are the picture of a grid: a homography fits to a fraction of a cell.
+    """Whether the points (rows, columns, 2) are a grid's picture: a homography fits to a fraction of a cell.
 
     The fit is the direct linear transformation (Hartley and Zisserman 2004, algorithm 4.2); lenses bend a grid
     by less.
@@ -68,7 +68,7 @@ def choose_turns(hand: Array, candidates: Array) -> NDArray[np.int64]:
     hand_angles = se3.rotation_error_rad(hand[:, None], hand[None])
     angles = se3.rotation_error_rad(candidates[:, :, None, None], candidates[None, None])
     gaps = (angles - hand_angles[:, None, :, None]) / _ANGLE_SIGMA_RAD
-    cost = np.minimum(gaps**2, _ROBUST_LIMIT)
+    cost = np.nan_to_num(np.minimum(gaps**2, _ROBUST_LIMIT), nan=_ROBUST_LIMIT)
     each = np.arange(count)
     cost[each, :, each, :] = 0.0
 
