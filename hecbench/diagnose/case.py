@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.bundle_adjustment import Solution
-from hecbench.diagnose.fit import LEAST_SAMPLES, Fit, enclosing_points, fit
+from hecbench.diagnose.fit import LEAST_SAMPLES, Fit, assumed_points, enclosing_points, fit
 from hecbench.errors import HecbenchError, SolverFailure
 from hecbench.recording import Mounting, Recording
 from hecbench.robot import load_robot
@@ -84,7 +84,9 @@ class Case:
     def points_m(self) -> Array:
         """Corners of the rectangle or box around the target."""
         target = self.recording.target
-        return self.size_factor * enclosing_points(None if target is None else target.points_m)
+        if target is None:
+            return assumed_points(self.camera_T_target)
+        return self.size_factor * enclosing_points(target.points_m)
 
     @property
     def can_be_fitted(self) -> bool:

@@ -31,7 +31,7 @@ MUCH_BETTER = 0.35
 EXPLAINS = 0.15
 """Of the target's motion in the image; a wrong reading leaves about as much as it moves."""
 _ASSUMED_FOCAL_PX = 1000.0
-_ASSUMED_HALF_WIDTH_M = 0.05
+_ASSUMED_HALF_WIDTH = 0.05
 _WIDE = np.repeat([np.deg2rad(10.0), 0.2], 3) ** -2.0
 _PAIR_ANGLE_RAD = np.deg2rad(1.0)
 _POSITIONS_FOR_LINEAR = 6
@@ -201,14 +201,17 @@ class IdealCamera:
         return pixels, by_point, np.zeros((len(points_c), 2, 0))
 
 
-def enclosing_points(points_m: Array | None) -> Array:
-    """Corners (4, 3) m of the rectangle, or (8, 3) of the box, around target points; a 10 cm square for None."""
-    if points_m is None:
-        half = _ASSUMED_HALF_WIDTH_M
-        points_m = np.array([[-half, -half, 0.0], [half, half, 0.0]])
+def enclosing_points(points_m: Array) -> Array:
+    """Corners (4, 3) m of the rectangle, or (8, 3) of the box, around target points."""
     low, high = points_m.min(0), points_m.max(0)
     ends = [sorted({float(a), float(b)}) for a, b in zip(low, high, strict=True)]
     return np.array(np.meshgrid(*ends)).reshape(3, -1).T
+
+
+def assumed_points(camera_T_target: Array) -> Array:
+    """Corners (4, 3) m of a square for an unknown target: a tenth of its distance wide."""
+    half = _ASSUMED_HALF_WIDTH * float(np.median(np.linalg.norm(camera_T_target[:, :3, 3], axis=1)))
+    return enclosing_points(np.array([[-half, -half, 0.0], [half, half, 0.0]]))
 
 
 def hand_poses(mounting: Mounting, base_T_flange: Array) -> Array:
