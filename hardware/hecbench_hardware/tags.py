@@ -27,7 +27,7 @@ Grey = NDArray[np.uint8]
 
 _MOST_WRONG_BITS = 2
 _LEAST_MARGIN = 20.0
-_EDGE_PX = 2.0
+_MARGIN_CELLS = 0.7
 _LARGE_PX = 1000
 """Larger pictures are first searched at half their size; the edges are measured at full size in any case."""
 _MOST_BLUR_CELLS = 0.6
@@ -74,8 +74,9 @@ def locate(image: NDArray[np.uint8], camera: CameraModel, target: AprilTagTarget
         )
     grey = _grey(image)
     corners_px = _the_tag(grey, target)
-    _refuse_clipped(corners_px, camera)
-    _refuse_blurred(grey, corners_px, target)
+    cell_px = float(np.linalg.norm(np.diff(corners_px, axis=0), axis=1).min()) / FAMILIES[target.family]
+    _refuse_clipped(corners_px, cell_px, camera)
+    _refuse_blurred(grey, corners_px, cell_px)
     found = []
     for rough in planar_solutions(corners_px, camera, target):
         refined = tag_edges.refined(grey, camera, target, rough)
@@ -161,16 +162,17 @@ def _the_tag(grey: Grey, target: AprilTagTarget) -> Array:
     raise TagRefused(f"{wanted} is not in the picture: uncover it, turn it to the camera, light it evenly")
 
 
-def _refuse_clipped(corners_px: Array, camera: CameraModel) -> None:
-    limit = np.array([camera.width, camera.height]) - 1 - _EDGE_PX
-    if (corners_px < _EDGE_PX).any() or (corners_px > limit).any():
+def _refuse_clipped(corners_px: Array, cell_px: float, camera: CameraModel) -> None:
+    """Refuse when the white margin around the tag is not in the picture."""
+    margin = _MARGIN_CELLS * cell_px
+    limit = np.array([camera.width, camera.height]) - 1 - margin
+    if (corners_px < margin).any() or (corners_px > limit).any():
         raise TagRefused("the tag touches the edge of the picture: move it or the camera")
 
 
-def _refuse_blurred(grey: Grey, corners_px: Array, target: AprilTagTarget) -> None:
+def _refuse_blurred(grey: Grey, corners_px: Array, cell_px: float) -> None:
     """Refuse when the outer edges are as wide as a cell."""
     width_px = edge_width_px(grey, corners_px)
-    cell_px = float(np.linalg.norm(np.diff(corners_px, axis=0), axis=1).min()) / FAMILIES[target.family]
     if width_px > max(_MOST_BLUR_PX, _MOST_BLUR_CELLS * cell_px):
         raise TagRefused(
             f"the tag is blurred, its edges are {width_px:.1f} px wide: focus, expose shorter, stand still"
