@@ -70,6 +70,10 @@ def _colours(change: Callable[[Picture], Picture]) -> Change:
     return apply
 
 
+def _unchanged(picture: Picture, rng: np.random.Generator) -> Picture:
+    return picture
+
+
 def _noise(picture: Picture, rng: np.random.Generator) -> Picture:
     noisy = picture[..., :3] + rng.normal(0, 0.05, picture[..., :3].shape).astype(np.float32)
     return np.concatenate([np.clip(noisy, 0, 1), picture[..., 3:]], -1)
@@ -143,7 +147,7 @@ def make(level: str, index: int, seed: int) -> Recording:
     model, mesh = robot_and_mesh()
     rng = np.random.default_rng([seed, zlib.crc32(level.encode()), index, 1])
     colours = rng.uniform(0, 1, mesh.colours.shape) if level == "colours" else mesh.colours
-    change = CHANGES.get(level, lambda picture, _: picture)
+    change = CHANGES.get(level, _unchanged)
     images, masks = [], []
     for base_T_link in model.link_poses(truth.joints_rad, frame=BASE):
         drawn = mesh if level not in MISMATCH else mesh.scaled(base_T_link, truth.scale)

@@ -6,6 +6,7 @@ from __future__ import annotations
 
 import numba
 import numpy as np
+from numpy.typing import NDArray
 
 _jit = numba.njit(cache=True, nogil=True)
 
@@ -64,7 +65,9 @@ def huber_slope(image, observed, huber, out):
 
 
 @_jit
-def normal_equations(pixels, rates, change, columns, image, observed, slope, huber, slot, rows, touched, A, b):
+def normal_equations(
+    pixels, rates, change, columns, image, observed, slope, huber, slot, rows, touched, A, b
+):
     """Add J'WJ to `A` (M, M) and -J's to `b` (M,) for the pixels that the crossings change.
 
     `pixels` (N, 2) flat; `rates` (N, 2) how each pixel mixes; `change` (N, C) colour of p minus colour of q;
@@ -125,7 +128,9 @@ def row_weights(jacobian, residual, clip, A, b):
     return cost
 
 
-def scratch(height, width, channels, unknowns):
+def scratch(
+    height: int, width: int, channels: int, unknowns: int
+) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.int32]]:
     """`slot`, `rows` and `touched` for `normal_equations`."""
     capacity = max(4096, height * width // 8)
     return (

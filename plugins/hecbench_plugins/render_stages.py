@@ -23,6 +23,10 @@ Step = tuple[float, Array, Array]
 _SMALL_STEP = 2e-6
 _FEWEST_CROSSINGS = 30
 _FEWEST_PURE = 10
+_FEWEST_PARTS = 4
+_ANY_COLOUR = 10.0
+_DARKEST = 0.02
+_TONE_MISFIT = 0.05
 _MASK_REACH_PX = 2
 _VIOLATION_CLIP_PX = 0.1
 _COVERAGE_WEIGHT = 0.02
@@ -91,7 +95,7 @@ def silhouette_step(
         for view, distance in zip(views, distances, strict=True):
             at = draw(view, level, pose, trace)
             crossings = at.renderer.crossings
-            outer = (crossings.parts < 0).any(1)
+            outer = np.asarray((crossings.parts < 0).any(1))
             residual, jacobian = contour_rows(crossings, outer, distance)
             cost += kernels.row_weights(jacobian, residual, clip, A, b)
             count += len(residual)
@@ -118,6 +122,15 @@ def distances_at(views: Sequence[View], level: int) -> list[NDArray[np.float32]]
     return [signed_distance(view.levels[level].observed[..., 3]) for view in views]
 
 
+@dataclass(frozen=True, eq=False)
+class PartColours:
+    """RGB (P, 3) of the parts of one view, which (P,) of them were seen, and in how many pixels (P, 3)."""
+
+    table: NDArray[np.float32]
+    seen: NDArray[np.bool_]
+    pixels: Array
+
+
 @dataclass(eq=False)
 class Photometry:
     """The picture of flat parts on a flat background against the observed one, one colour per part and view.
@@ -137,10 +150,10 @@ class Photometry:
     blur_px: float = 0.0
 
     def __post_init__(self) -> None:
-        self._colours: list[NDArray[np.float32] | None] = [None] * len(self.views)
+        self.fitted: list[PartColours | None] = [None] * len(self.views)
         shapes = [view.levels[self.level].observed.shape[:2] for view in self.views]
         count = self.channels.stop - self.channels.start
-        self._scratch = [kernels.scratch(*shape, count, 6) for shape in shapes]
+        self._scratch = [kernels.scratch(shape[0], shape[1], count, 6) for shape in shapes]
         self._slopes = [np.zeros((*shape, count), np.float32) for shape in shapes]
         self.residuals: list[NDArray[np.float32]] = [np.zeros(0, np.float32)] * len(self.views)
         """Of every value of the last pictures."""
@@ -148,20 +161,20 @@ class Photometry:
     def colours(self, index: int, at: Level) -> NDArray[np.float32]:
         """Colours (P, 3) of the parts in one view at the drawn pose; unseen parts follow the seen ones."""
         nominal = at.renderer.mesh.colours
-        known = self._colours[index]
+        known = self.fitted[index]
         part, box = at.renderer.part, at.renderer.box
         sums, counts = np.zeros_like(nominal), np.zeros_like(nominal)
-        current = nominal if known is None else known.astype(float)
         margin = 1 + int(np.ceil(2 * self.blur_px))
         for _ in range(3 if known is None else 1):
-            width = 10.0 if known is None else max(self.huber, 0.05)
+            width = _ANY_COLOUR if known is None else max(self.huber, 0.05)
+            current = nominal if known is None else known.table.astype(float)
             kernels.part_colours(part, at.observed, box, current, width, margin, sums, counts)
             seen = counts > _FEWEST_PURE
-            current = np.where(seen, sums / np.maximum(counts, 1), _follow(nominal, sums, counts, seen))
-            known = current.astype(np.float32)
-        self._colours[index] = known
+            table = np.where(seen, sums / np.maximum(counts, 1), _follow(nominal, sums, counts, seen))
+            known = PartColours(table.astype(np.float32), np.asarray(seen.all(1)), counts.copy())
+        self.fitted[index] = known
         assert known is not None
-        return known
+        return known.table
 
     def __call__(self, pose: Array) -> Step:
         A, b, cost, crossed = np.zeros((6, 6)), np.zeros(6), 0.0, 0
@@ -194,7 +207,7 @@ class Photometry:
         else:
             area = (slice(box[2], box[3] + 1), slice(box[0], box[1] + 1))
             kernels.huber_slope(image[area], observed[area], self.huber, slope[area])
-        self.residuals[index] = image - observed
+        self.residuals[index] = (image - observed)[area]
         crossings = renderer.crossings
         change = (table[crossings.parts[:, 0]] - table[crossings.parts[:, 1]])[:, self.channels]
         kernels.normal_equations(
@@ -214,13 +227,80 @@ class Photometry:
             kernels.cost_change(image, observed, box, background[self.channels], self.huber, image.shape[2])
         )
 
+    def colour_information(self) -> Array:
+        """Sum (6, 6) of g g' / n over parts and channels: what their colours' errors add to the right-hand side.
+
+        g is the derivative of J'r by a colour, n the number of pixels that the colour is the mean of; in units of
+        the noise's variance.
+        """
+        total = np.zeros((6, 6))
+        for view, fitted in zip(self.views, self.fitted, strict=True):
+            if fitted is None:
+                continue
+            crossings = view.levels[self.level].renderer.crossings
+            table = np.vstack([fitted.table, view.levels[self.level].background[:3]]).astype(float)
+            change = table[crossings.parts[:, 0]] - table[crossings.parts[:, 1]]
+            pixels, slot = np.unique(crossings.pixels, return_inverse=True)
+            slot = slot.reshape(crossings.pixels.shape)
+            rows = np.zeros((len(pixels), 3, 6))
+            share = np.zeros((len(pixels), len(table)))
+            columns = crossings.pose_columns()
+            share[slot, crossings.parts] = 1.0
+            for end in range(2):
+                own, other = crossings.parts[:, end], crossings.parts[:, 1 - end]
+                rate, taken = crossings.mix[:, 2 * end + 1], crossings.mix[:, 2 * end]
+                np.add.at(rows, slot[:, end], (rate[:, None] * change)[:, :, None] * columns[:, None])
+                np.add.at(share, (slot[:, end], other), taken)
+                np.add.at(share, (slot[:, end], own), -taken)
+            g = np.einsum("xp,xcm->pcm", share[:, :-1], rows)[fitted.seen]
+            n = fitted.pixels[fitted.seen]
+            total += np.einsum("pcm,pck,pc->mk", g, g, 1 / n)
+        return total
+
+    def noise(self) -> float:
+        """Standard deviation of the last residuals around the robot, larger when neighbours resemble each other.
+
+        Residuals correlated by r along rows and columns tell as much as a share (1 - r)^2 / (1 + r)^2 of them.
+        """
+        squares = sum(float((residual**2).sum()) for residual in self.residuals)
+        count = sum(residual.size for residual in self.residuals)
+        beside = sum(float((r[:, 1:] * r[:, :-1]).sum() + (r[1:] * r[:-1]).sum()) / 2 for r in self.residuals)
+        r = float(np.clip(beside / max(squares, 1e-30), 0, 0.9))
+        return float(np.sqrt(squares / max(count - 6, 1)) * (1 + r) / (1 - r))
+
     def _grown(self, box: NDArray[np.int32], shape: tuple[int, ...]) -> NDArray[np.int32]:
         by = int(np.ceil(4 * self.blur_px))
         left, right, top, bottom = box
         return np.array(
-            [max(0, left - by), min(shape[1] - 1, right + by), max(0, top - by), min(shape[0] - 1, bottom + by)],
+            [
+                max(0, left - by),
+                min(shape[1] - 1, right + by),
+                max(0, top - by),
+                min(shape[0] - 1, bottom + by),
+            ],
             np.int32,
         )
+
+
+def tone_exponent(photometry: Photometry) -> float:
+    """The exponent of the pictures' tone curve, by the colours found for the parts against the model's own.
+
+    1 when the two are not related by gain and exponent, as when the robot is painted otherwise.
+    """
+    nominal, found = [], []
+    for view, colours in zip(photometry.views, photometry.fitted, strict=True):
+        if colours is not None:
+            table, seen = view.levels[photometry.level].renderer.mesh.colours, colours.seen
+            nominal.append(table[seen])
+            found.append(colours.table[seen])
+    x, y = np.concatenate(nominal), np.concatenate(found)
+    use = (x > _DARKEST) & (y > _DARKEST)
+    if use.sum() < 3 * _FEWEST_PARTS or np.ptp(np.log(x[use])) < 0.5:
+        return 1.0
+    exponent, gain = np.polyfit(np.log(x[use]), np.log(y[use]), 1)
+    misfit = np.std(np.log(y[use]) - exponent * np.log(x[use]) - gain)
+    trusted = misfit < _TONE_MISFIT and abs(exponent - 1) > _TONE_MISFIT
+    return float(exponent) if trusted else 1.0
 
 
 def _follow(nominal: Array, sums: Array, counts: Array, seen: NDArray[np.bool_]) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -137,6 +137,17 @@ def _view(
     return View(parent_T_link, levels, full, has_image, uniform)
 
 
+def linearised(view: View, gamma: float) -> View:
+    """The view with its colours raised to 1 / gamma, so that neighbouring colours mix linearly at edges again."""
+    levels = {}
+    for size, level in view.levels.items():
+        observed, background = level.observed.copy(), level.background.copy()
+        observed[..., :3] = np.maximum(observed[..., :3], 0) ** (1 / gamma)
+        background[:3] = np.maximum(background[:3], 0) ** (1 / gamma)
+        levels[size] = replace(level, observed=observed, background=background)
+    return replace(view, levels=levels)
+
+
 def scaled_intrinsics(K: Array, level: int) -> Array:
     """K of an image shrunk `level` times, pixel centres at integers before and after."""
     small = K.copy()
@@ -193,4 +204,4 @@ def signed_distance(mask: Picture) -> NDArray[np.float32]:
     inside = (mask > 0.5).astype(np.uint8)
     outward = cv2.distanceTransform(1 - inside, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     inward = cv2.distanceTransform(inside, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    return np.where(inside > 0, 0.5 - inward, outward - 0.5).astype(np.float32)
+    return np.asarray(np.where(inside > 0, 0.5 - inward, outward - 0.5), np.float32)

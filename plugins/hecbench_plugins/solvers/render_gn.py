@@ -22,7 +22,7 @@ from hecbench.registry import hookimpl
 from hecbench.specs import Need, SolverSpec
 from hecbench_plugins import render_evidence as evidence
 from hecbench_plugins import render_stages as stages
-from hecbench_plugins.render_views import View, prepare
+from hecbench_plugins.render_views import View, linearised, prepare
 
 Array = NDArray[np.float64]
 
@@ -100,6 +100,12 @@ class RenderGN:
             for level, rounds in ((4, 8), (2, 8), (1, 20)):
                 photometry = stages.Photometry(views, level, slice(0, 3), self.huber, trace)
                 descent = stages.descend(photometry, pose, rounds, trace, f"colour/{level}")
+                pose = descent.pose
+            exponent = stages.tone_exponent(photometry)
+            if exponent != 1.0:
+                views = [linearised(view, exponent) for view in views]
+                photometry = stages.Photometry(views, 1, slice(0, 3), self.huber, trace)
+                descent = stages.descend(photometry, pose, 20, trace, f"tone {exponent:.2f}/1")
                 pose = descent.pose
             for blur in _BLURS_PX:
                 blurred = stages.Photometry(views, 1, slice(0, 3), self.huber, trace, blur_px=blur)
