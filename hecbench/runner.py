@@ -59,10 +59,10 @@ def load_recording(path: Path) -> Recording:
     Raises:
         InputError: nothing there, no adapter or several recognise it, or the adapter finds a fault.
     """
-    if not path.exists():
-        raise InputError(f"{path}: does not exist; give a recording's folder")
     adapters = registry.load().ready(Kind.DATASET, DatasetSpec)
     found = [adapter for adapter in adapters if adapter.sniff(path)]
+    if not found and not path.exists():
+        raise InputError(f"{path}: does not exist; give a recording's folder")
     if not found:
         known = "; ".join(f"{adapter.name}: {adapter.summary}" for adapter in adapters)
         raise InputError(f"{path}: is no known recording. Known are {known}")
