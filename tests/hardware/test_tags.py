@@ -38,7 +38,9 @@ def drawn(camera_T_tag=POSE, target=TAG, camera=CAMERA, onto=None):
 def test_pose_is_exact_and_better_than_the_corners_alone(rng):
     errors, corners_alone = [], []
     for _ in range(6):
-        truth = se3.from_rotvec(rng.uniform(-0.6, 0.6, 3), [*rng.uniform(-0.15, 0.15, 2), rng.uniform(0.7, 1.2)])
+        truth = se3.from_rotvec(
+            rng.uniform(-0.6, 0.6, 3), [*rng.uniform(-0.15, 0.15, 2), rng.uniform(0.7, 1.2)]
+        )
         found = tags.locate(drawn(truth), CAMERA, TAG)
         errors.append(se3.translation_error_m(found.camera_T_tag, truth))
         rough = tags.planar_solutions(found.corners_px, CAMERA, TAG)
@@ -78,7 +80,9 @@ def test_official_orientation_is_x_right_y_down_z_into_the_tag():
 
 def test_small_distant_tag_has_two_poses_and_says_so():
     truth = se3.from_rotvec([0.12, 0.0, 0.0], [0.1, 0.1, 2.5])
-    found = tags.locate(drawn(truth, AprilTagTarget("tag36h11", 0, 0.2)), CAMERA, AprilTagTarget("tag36h11", 0, 0.2))
+    found = tags.locate(
+        drawn(truth, AprilTagTarget("tag36h11", 0, 0.2)), CAMERA, AprilTagTarget("tag36h11", 0, 0.2)
+    )
     assert found.other is not None
     assert found.other[1] >= found.error_px
 
@@ -131,7 +135,9 @@ def test_real_pictures_agree_with_the_pose_of_the_detection_library(shared, name
 
     picture = cv2.imread(str(shared / "data" / "pupil_tags" / name), cv2.IMREAD_GRAYSCALE)
     detector = Detector(families="tag36h11")
-    theirs = detector.detect(picture, estimate_tag_pose=True, camera_params=(fx, fy, cx, cy), tag_size=0.065)[0]
+    theirs = detector.detect(picture, estimate_tag_pose=True, camera_params=(fx, fy, cx, cy), tag_size=0.065)[
+        0
+    ]
     K = np.array([[fx, 0, cx - 0.5], [0, fy, cy - 0.5], [0, 0, 1]])
     camera = CameraModel(picture.shape[1], picture.shape[0], K)
     found = tags.locate(picture, camera, AprilTagTarget("tag36h11", theirs.tag_id, 0.065))

@@ -113,12 +113,19 @@ def test_numerical_kinematics_agree_with_the_closed_form(station, rng):
     from hecbench.robot import load_robot
 
     arm = UrdfArm(
-        "ur5e", (0.0, 0.0), (0.0,) * 4, model=load_robot("ur5e", meshes=False), base_link="base", flange_link="tool0"
+        "ur5e",
+        (0.0, 0.0),
+        (0.0,) * 4,
+        model=load_robot("ur5e", meshes=False),
+        base_link="base",
+        flange_link="tool0",
     )
     near = station.configuration_rad(0)
     for _ in range(5):
         joints = near + rng.uniform(-0.3, 0.3, 6)
-        assert np.allclose(arm.chain.forward(joints, base="base", tip="tool0"), station.arm.forward(joints), atol=1e-6)
+        assert np.allclose(
+            arm.chain.forward(joints, base="base", tip="tool0"), station.arm.forward(joints), atol=1e-6
+        )
 
 
 def test_vs060_reaches_every_place(shared):
