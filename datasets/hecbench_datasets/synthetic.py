@@ -158,6 +158,7 @@ def make(level: str, index: int, seed: int) -> Recording:
         images.append(np.round(255 * np.clip(picture[..., :3], 0, 1)).astype(np.uint8))
         masks.append(np.where(picture[..., 3] >= 0.5, 255, 0).astype(np.uint8))
     joint_noise = rng.normal(0, np.deg2rad(0.1), truth.joints_rad.shape) if level == "joint_noise" else 0.0
+    joints = truth.joints_rad + joint_noise
     return Recording(
         name=f"synthetic_{level}_{index:03d}",
         mounting=Mounting.EYE_TO_HAND,
@@ -168,7 +169,8 @@ def make(level: str, index: int, seed: int) -> Recording:
         camera=truth.camera,
         initial_parent_T_camera=se3.inverse(truth.start_camera_T_base),
         truth_parent_T_camera=se3.inverse(truth.camera_T_base),
-        joints_rad=truth.joints_rad + joint_noise,
+        base_T_flange=model.forward(joints, base=BASE, tip=FLANGE),
+        joints_rad=joints,
         images=tuple(images),
         masks=tuple(masks),
     )

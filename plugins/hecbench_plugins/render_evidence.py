@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,7 +58,7 @@ def answer(
     parent_T_camera = se3.inverse(camera_T_parent)
     covariance = None
     values, directions = _scaled(information, camera_T_parent, views)
-    diagnostics = {
+    diagnostics: dict[str, Any] = {
         "stage": end.kind,
         "overlap": iou,
         "noise": noise,
@@ -71,6 +72,10 @@ def answer(
         covariance = (_ROUGHNESS * noise) ** 2 * carried @ inverse @ carried.T
         covariance = (covariance + covariance.T) / 2
     diagnostics["weakest_direction"] = [round(float(part), 3) for part in directions[:, 0]]
+    diagnostics["path"] = [
+        [stage, None if np.isnan(cost) else round(cost, 6), se3.log(se3.inverse(pose)).round(6).tolist()]
+        for stage, pose, cost in trace.poses
+    ]
     diagnostics["overlap_from_the_other_side"] = overlap(views, camera_T_parent @ _HALF_TURN, trace)
     return Estimate(
         parent_T_camera,

@@ -56,6 +56,7 @@ def centroid_and_area(views: Sequence[View], start: Array, trace: Trace, rounds:
     A robot out of the picture is put on the ray through the mask's centroid.
     """
     pose = start.copy()
+    trace.poses.append(("start", start, float("nan")))
     for _ in range(rounds):
         moves = []
         for view in views:
