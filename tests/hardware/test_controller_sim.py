@@ -37,6 +37,7 @@ def control_client(running_controller):
 
 @pytest.fixture
 def control(control_client, controller):
+    wait_until(lambda: not control_client.isProgramRunning())  # else it waits for the program that was ended
     control_client.reuploadScript()
     wait_until(control_client.isProgramRunning)
     return control_client
