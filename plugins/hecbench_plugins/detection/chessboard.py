@@ -41,9 +41,9 @@ def corners(grey: Grey, columns: int, rows: int) -> Array | None:
 
 
 def _window(grid: Array) -> int:
-    """Half the refinement window, px: a third of the closest corners' distance, so that it holds one."""
+    """Half the refinement window, px: half the closest corners' distance, so that it holds one."""
     sides = [np.linalg.norm(np.diff(grid, axis=axis), axis=2).min() for axis in (0, 1)]
-    return int(np.clip(min(sides) / 3, *_WINDOW_PX))
+    return int(np.clip(min(sides) / 2, *_WINDOW_PX))
 
 
 def _first_square_lightness(grey: Grey, grid: Array) -> float:
