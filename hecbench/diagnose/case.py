@@ -23,6 +23,8 @@ Observe = Callable[[Recording], Recording]
 
 STANDS_OUT = 5.0
 """Variance ratio (6 and 6 N - 19 degrees of freedom) that a sample of ten exceeds once in 1500 times."""
+_REJECTED_AT_ONCE = 40
+"""One sample in so many; the others are then judged without them."""
 _LEAST_SHARE = 0.5
 """Of the samples that must agree."""
 
@@ -122,7 +124,8 @@ class Case:
                 different = np.where(agreeing, found.studentised(agreeing), 0.0)
                 if different.max() <= STANDS_OUT:
                     break
-                agreeing[different.argmax()] = False
+                worst = np.argsort(-different)[: 1 + len(agreeing) // _REJECTED_AT_ONCE]
+                agreeing[worst[different[worst] > STANDS_OUT]] = False
                 found = found.refitted_to(agreeing)
         except (SolverFailure, np.linalg.LinAlgError):
             return None

@@ -43,6 +43,7 @@ _ROBUST = 1.5
 _LEAST_SCATTER = 0.02
 """Of the typical variances: exact data must not make rounding errors stand out."""
 _ITERATIONS = 20
+_MOST_COMPARED = 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -201,6 +202,11 @@ class IdealCamera:
         return pixels, by_point, np.zeros((len(points_c), 2, 0))
 
 
+def spread(count: int) -> NDArray[np.int64]:
+    """At most 100 indices, evenly spaced: comparing all pairs of thousands of samples gains nothing."""
+    return np.unique(np.linspace(0, count - 1, min(count, _MOST_COMPARED)).astype(int))
+
+
 def enclosing_points(points_m: Array) -> Array:
     """Corners (4, 3) m of the rectangle, or (8, 3) of the box, around target points."""
     low, high = points_m.min(0), points_m.max(0)
@@ -252,7 +258,11 @@ def fit(
 
 def _starts(problem: Problem, camera_T_target: Array) -> Iterator[State]:
     """From the rotations, and from the positions alone, which planar flips do not touch."""
-    hand = hand_poses(problem.mounting, problem.base_T_flange)
+    chosen = spread(len(camera_T_target))
+    hand, camera_T_target = (
+        hand_poses(problem.mounting, problem.base_T_flange)[chosen],
+        camera_T_target[chosen],
+    )
     for rotation in (_from_rotations(hand, camera_T_target), _from_positions(hand, camera_T_target)):
         if rotation is None:
             continue

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from hecbench import se3
 from hecbench.diagnose.case import Case, inverted
 from hecbench.diagnose.finding import Finding, Severity
+from hecbench.diagnose.fit import spread
 
 Array = NDArray[np.float64]
 
@@ -84,9 +85,10 @@ def _compare(by_joints: Array, given: Array, indices: NDArray[np.int64]) -> list
 
 def _most_agreed(poses: Array) -> Array:
     """The one of poses (M, 4, 4) that most others are near."""
-    apart = se3.translation_error_m(poses[:, None], poses)
-    apart = apart + _LEVER_M * se3.rotation_error_rad(poses[:, None], poses)
-    return np.asarray(poses[np.median(apart, axis=1).argmin()])
+    candidates = poses[spread(len(poses))]
+    apart = se3.translation_error_m(candidates[:, None], poses)
+    apart = apart + _LEVER_M * se3.rotation_error_rad(candidates[:, None], poses)
+    return np.asarray(candidates[np.median(apart, axis=1).argmin()])
 
 
 def examine(case: Case) -> tuple[Finding | None, Case]:

@@ -17,6 +17,8 @@ Array = NDArray[np.float64]
 
 ID = "planar_ambiguity"
 LEAST_DEG = 8.0
+FEW = 0.05
+"""Share of mirrored poses that robust methods get over."""
 _CLOSER = 0.5
 
 
@@ -43,7 +45,8 @@ def examine(case: Case) -> tuple[Finding | None, Case]:
         if given
         else "use a larger target or tilt it more; prefer methods that use corners or positions"
     )
-    severity = Severity.CRITICAL if given else Severity.WARNING
+    many = flipped.mean() > FEW
+    severity = Severity.CRITICAL if given and many else Severity.WARNING
     return Finding(ID, severity, summary, action, float(gaps[flipped].max()), LEAST_DEG, concerned), case
 
 

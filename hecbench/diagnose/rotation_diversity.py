@@ -13,6 +13,7 @@ import numpy as np
 from hecbench import se3
 from hecbench.diagnose.case import Case
 from hecbench.diagnose.finding import Finding, Severity
+from hecbench.diagnose.fit import spread
 
 ID = "rotation_diversity"
 LEAST_ANGLE_DEG = 10.0
@@ -33,6 +34,7 @@ def examine(case: Case) -> tuple[Finding | None, Case]:
             ID, Severity.CRITICAL, summary, "record 10 or more samples", float(len(rotations)), 3.0
         )
         return finding, replace(case, judged=False)
+    rotations = rotations[spread(len(rotations))]
     i, j = np.triu_indices(len(rotations), 1)
     logs = se3.so3_log(np.swapaxes(rotations[i], 1, 2) @ rotations[j])
     largest = float(np.rad2deg(np.linalg.norm(logs, axis=1).max()))
