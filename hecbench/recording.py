@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hecbench import se3
 from hecbench.errors import InputError, Refusal
-from hecbench.specs import Need
+from hecbench.needs import Need
 from hecbench.targets import Target
 
 Array = NDArray[np.float64]

@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, ClassVar, Protocol
 
 import numpy as np
 
+from hecbench.needs import Need as Need
+
 if TYPE_CHECKING:
     from hecbench.estimate import Estimate
     from hecbench.recording import Recording
@@ -29,19 +31,6 @@ class Kind(StrEnum):
     ROBOT = "robot"
     GRIPPER = "gripper"
     CAMERA = "camera"
-
-
-class Need(StrEnum):
-    """What a solver asks of a recording."""
-
-    TARGET_POSES = "target_poses"
-    CORNERS = "corners"
-    INTRINSICS = "intrinsics"
-    IMAGES = "images"
-    MASKS = "masks"
-    JOINTS = "joints"
-    ROBOT_MODEL = "robot_model"
-    INITIAL = "initial"
 
 
 class Solver(Protocol):
