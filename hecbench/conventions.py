@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 HINTS_NAME = "hecbench-import.yaml"
 """The file beside other people's data that says what they do not (docs/adapters.md)."""
 
+_CURE = f"write which is meant (mounting, robot_pose, target_pose ...) into {HINTS_NAME} beside it"
+
 EULER_ORDERS = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX", "XYX", "XZX", "YXY", "YZY", "ZXZ", "ZYZ")
 ROTATIONS = {
     4: ("quat_xyzw", "quat_wxyz"),
@@ -213,7 +215,7 @@ def prove(
         if len(documented) != 1:
             raise InputError(
                 f"{source}: {count} samples cannot tell {len(documented)} possible readings apart; it takes "
-                f"{_LEAST_SAMPLES}, or say which is meant in {HINTS_NAME} beside it"
+                f"{_LEAST_SAMPLES}, or {_CURE}"
             )
         return _proof(documented[0], f"{source}: read as {documented[0].name}; too few samples to prove it")
     limit = min(_STILL, _CLEARLY_WORSE * min(c.stillness.relative for c in candidates) + 0.01)
@@ -224,7 +226,7 @@ def prove(
     if len(fitting) > 1:
         raise InputError(
             f"{source}: {len(fitting)} readings hold the target equally still: "
-            f"{'; '.join(map(str, fitting[:6]))}; say which is meant in {HINTS_NAME} beside it"
+            f"{'; '.join(map(str, fitting[:6]))}; {_CURE}"
         )
     if fitting:
         best = fitting[0]
@@ -241,7 +243,7 @@ def prove(
         return _proof(documented[0], note + f"the best is {ranked[0]}: pairs mixed up, or too little motion?")
     raise InputError(
         f"{source}: no reading holds the target still; the best are {'; '.join(map(str, ranked[:3]))}; "
-        f"check the pairing of robot and target poses, or say how to read them in {HINTS_NAME} beside it"
+        f"check the pairing of robot and target poses, or {_CURE}"
     )
 
 
