@@ -145,7 +145,7 @@ def _lab_cell(options: dict[str, Any], opened: ExitStack) -> tuple[TrialCell, li
         camera = lab_camera(station, model, sensor, options["seed"])
         opened.callback(camera.close)
     take_control(robot, "trials", armed=options["arm"], confirm=lambda line: True)
-    return LabCell(station, robot, camera), found, notes
+    return LabCell(station, robot, camera, options["seed"]), found, notes
 
 
 def _lab_robot(options: dict[str, Any], station: Any) -> Any:

@@ -31,7 +31,7 @@ class LabCamera:
         self.base_T_workpiece: Array | None = None
         self._home_rad = home_rad
         self._robot: Robot | None = None
-        self._rng = np.random.default_rng(seed)
+        self.rng = np.random.default_rng(seed)
         self._count = 0
 
     def follow(self, robot: Robot) -> None:
@@ -45,7 +45,7 @@ class LabCamera:
     def grab(self, timeout_s: float = 2.0) -> Frame:
         """The picture now."""
         self.eye.scene.place(self.joints_rad(), self.base_T_workpiece)
-        image = self.eye.image(self.base_T_camera, self._rng, self._tag_m())
+        image = self.eye.image(self.base_T_camera, self.rng, self._tag_m())
         self._count += 1
         return Frame(image, time.time(), None, f"lab {self._count:06d}")
 

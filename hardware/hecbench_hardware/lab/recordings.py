@@ -61,7 +61,7 @@ def marker_recording(
     eye = Eye(_scene(station, carried), how.camera, how.sensor, whole=False)
     joints, corners = [], []
     try:
-        for candidate in _tag_joints(station, calibration, carried, how, rng):
+        for candidate in tag_joints(station, calibration, carried, how, rng):
             eye.scene.place(candidate)
             base_T_tag = station.arm.forward(candidate) @ carried.flange_T_tag
             corners_m = se3.transform_points(base_T_tag, carried.target.points_m)
@@ -79,7 +79,7 @@ def marker_recording(
     if len(joints) < how.samples:
         raise InputError(f"calibration {calibration}: only {len(joints)} of {how.samples} poses show the tag")
     return replace(
-        _described(
+        described(
             station, f"lab_{station.name}_{calibration:02d}", np.array(joints), base_T_camera, how.camera
         ),
         target=carried.target,
@@ -87,14 +87,16 @@ def marker_recording(
     )
 
 
-def view_recording(calibration: int, seed: int = 0, station: Station | None = None) -> Recording:
-    """Ten pictures of the arm around a configuration with masks, truth and a start some centimetres off."""
+def view_recording(
+    calibration: int, seed: int = 0, station: Station | None = None, samples: int = 10
+) -> Recording:
+    """Pictures of the arm around a configuration with masks, truth and a start some centimetres off."""
     station, camera = station or ur5e(), camera_model(640, 480, 606.0)
     rng = np.random.default_rng([seed, calibration, 2])
     centre = station.configuration_rad(calibration)
-    joints = centre + rng.uniform(-_VIEW_SPREAD_RAD, _VIEW_SPREAD_RAD, (10, len(centre)))
+    joints = centre + rng.uniform(-_VIEW_SPREAD_RAD, _VIEW_SPREAD_RAD, (samples, len(centre)))
     base_T_camera = station.camera_pose(calibration)
-    recording = _described(station, f"lab_views_{calibration:02d}", joints, base_T_camera, camera)
+    recording = described(station, f"lab_views_{calibration:02d}", joints, base_T_camera, camera)
     return with_pictures(
         replace(
             recording, initial_parent_T_camera=se3.exp(rng.uniform(-1, 1, 6) * _START_ERROR) @ base_T_camera
@@ -123,7 +125,7 @@ def with_pictures(
     return replace(recording, images=tuple(images), masks=tuple(masks))
 
 
-def _described(
+def described(
     station: Station, name: str, joints: Array, base_T_camera: Array, camera: CameraModel
 ) -> Recording:
     known = station.model == "ur5e"
@@ -156,7 +158,7 @@ def _scene(station: Station, carried: FlangeTag | None) -> Scene:
     )
 
 
-def _tag_joints(
+def tag_joints(
     station: Station, calibration: int, carried: FlangeTag, how: MarkerSet, rng: np.random.Generator
 ) -> list[Array]:
     """Joints within the limits that turn and shift the tag around its pose in the configuration."""

@@ -65,11 +65,12 @@ class Scene:
         base_link: str,
         flange_link: str,
         gripper: solids.Gripper | None = None,
+        peg_of: solids.Gripper | None = None,
         flange_tag: FlangeTag | None = None,
         workpiece: bool = False,
         surroundings: Surroundings | None = None,
     ) -> None:
-        """Build it; `gripper` draws boxes for one whose meshes the robot does not have."""
+        """Build it; `gripper` draws boxes for one whose meshes the robot does not have, `peg_of` the peg in it."""
         import mujoco
 
         self.robot, self.joint_names, self.base_link = robot, joint_names, base_link
@@ -84,6 +85,8 @@ class Scene:
         self._links = self._add_links(spec)
         if gripper is not None:
             self._add_on_flange(spec, "gripper", gripper.flange_T_tool, gripper.solids(), (0.2, 0.2, 0.22))
+        if peg_of is not None:
+            self._add_on_flange(spec, "peg", peg_of.flange_T_tool, (solids.peg(),), (0.8, 0.75, 0.3))
         if flange_tag is not None:
             body = spec.worldbody.add_body(name="flange_tag", mocap=True)
             _add_tag(spec, body, "flange_tag", flange_tag.target, np.eye(4))
@@ -92,7 +95,7 @@ class Scene:
         self.model = spec.compile()
         self.data = mujoco.MjData(self.model)
         self._flange_tag = flange_tag
-        self._gripper = gripper
+        self._on_flange = {"gripper": gripper, "peg": peg_of}
         self._view = mujoco.MjvScene(self.model, maxgeom=self.model.ngeom + 100)
         self._option = mujoco.MjvOption()
         self._camera = mujoco.MjvCamera()
@@ -100,16 +103,24 @@ class Scene:
 
     # state
 
-    def place(self, joints_rad: Array, base_T_workpiece: Array | None = None) -> None:
-        """Move the arm, with what it carries, to joints (J,) rad, and the workpiece to a pose (4, 4)."""
+    def place(
+        self, joints_rad: Array, base_T_workpiece: Array | None = None, fingers_rad: float = 0.0
+    ) -> None:
+        """Move the arm, with what it carries, to joints (J,) rad, and the workpiece to a pose (4, 4).
+
+        `fingers_rad` goes to the joints of the model that are not the arm's.
+        """
         import mujoco
 
-        base_T_link = self.robot.link_poses(joints_rad, self.joint_names, frame=self.base_link)
+        others = tuple(name for name in self.robot.joint_names if name not in self.joint_names)
+        joints = np.append(joints_rad, [fingers_rad] * len(others))
+        base_T_link = self.robot.link_poses(joints, self.joint_names + others, frame=self.base_link)
         for name, index in self._links.items():
             self._put(name, base_T_link[index])
         base_T_flange = base_T_link[self._flange]
-        if self._gripper is not None:
-            self._put("gripper", base_T_flange @ self._gripper.flange_T_tool)
+        for name, held in self._on_flange.items():
+            if held is not None:
+                self._put(name, base_T_flange @ held.flange_T_tool)
         if self._flange_tag is not None:
             self._put("flange_tag", base_T_flange @ self._flange_tag.flange_T_tag)
         if base_T_workpiece is not None:

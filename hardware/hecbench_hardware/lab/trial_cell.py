@@ -36,12 +36,15 @@ def lab_camera(station: Station, model: CameraModel, sensor: Sensor, seed: int) 
 
 
 class LabCell:
-    """Any robot whose arm is the station's: the lab's own, or a real driver on a simulated controller."""
+    """Any robot whose arm is the station's: the lab's own, or a real driver on a simulated controller.
+
+    One picture is taken for each calibration and place, the same for every method that is tried there.
+    """
 
     places = 3
 
-    def __init__(self, station: Station, robot: Robot, camera: LabCamera | None) -> None:
-        """Without a camera the pose of the tag is exact."""
+    def __init__(self, station: Station, robot: Robot, camera: LabCamera | None, seed: int = 0) -> None:
+        """Without a camera the pose of the tag is exact; `seed` draws the noise of the pictures."""
         self.station, self.robot, self.camera = station, robot, camera
         self.name = station.name
         self.shape, self.home_rad = station.gripper, station.home_rad
@@ -52,27 +55,35 @@ class LabCell:
         self.gripper: Gripper = gripper
         self._workpiece = station.workpiece_pose(0)
         self._camera_pose = station.camera_pose(0)
+        self._seed = seed
+        self._setting = 0, 0
+        self._seen: dict[tuple[int, int], Array] = {}
         if camera is not None:
             camera.follow(robot)
 
     def prepare(self, calibration: Calibration, place: int) -> None:
         """Put the workpiece at a place and the camera where the calibration was made."""
+        self._setting = calibration.number, place
         self._workpiece = self.station.workpiece_pose(place)
         self._camera_pose = self.station.camera_pose(calibration.number)
         if self.camera is not None:
             self.camera.base_T_workpiece = self._workpiece
             self.camera.base_T_camera = self._camera_pose
+            self.camera.rng = np.random.default_rng([self._seed, *self._setting, 4])
 
     def locate(self) -> Array:
         """From the picture, or the truth where nothing is drawn."""
         if self.camera is None:
             return self.truth()[1]
-        model = self.camera.intrinsics()
-        assert model is not None
-        try:
-            return tags.locate(self.camera.grab().image, model, solids.TAG).camera_T_tag
-        except TagRefused as refusal:
-            raise NotSeen(str(refusal)) from None
+        if self._setting not in self._seen:
+            model = self.camera.intrinsics()
+            assert model is not None
+            try:
+                found = tags.locate(self.camera.grab().image, model, solids.TAG)
+            except TagRefused as refusal:
+                raise NotSeen(str(refusal)) from None
+            self._seen[self._setting] = found.camera_T_tag
+        return self._seen[self._setting]
 
     def judge(self, task: Task, stroke: Stroke, clearance_m: float) -> Verdict:
         """By the contact sweep along the true path."""

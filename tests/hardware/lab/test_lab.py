@@ -143,7 +143,7 @@ def test_vs060_reaches_every_place(shared):
 
 
 def test_view_recording_has_pictures_masks_and_truth(drawable, station):
-    recording = recordings.view_recording(0).subset([0, 1])
+    recording = recordings.view_recording(0, samples=2)
     assert recording.image(0).shape == (480, 640, 3)
     assert 0.01 < recording.mask(1).mean() < 0.3
     assert recording.truth_parent_T_camera is not None
