@@ -1,6 +1,6 @@
 """The figures of docs/trials.md: contact sweep, tag accuracy, sweeps of what decides the ranking, pictures.
 
-    python benchmarks/bench_trials.py contact | tag | conditions | pictures OUT
+python benchmarks/bench_trials.py contact | tag | conditions | pictures OUT
 """
 
 from __future__ import annotations
@@ -77,7 +77,11 @@ def tag(count: int = 10) -> None:
                 eye.scene.place(station.home_rad, base_T_workpiece)
                 base_T_tag = base_T_workpiece @ solids.workpiece_T_tag()
                 azimuth, elevation = rng.uniform(-0.5, 0.5), rng.uniform(0.1, 0.6)
-                away = [np.cos(azimuth) * np.cos(elevation), np.sin(azimuth) * np.cos(elevation), np.sin(elevation)]
+                away = [
+                    np.cos(azimuth) * np.cos(elevation),
+                    np.sin(azimuth) * np.cos(elevation),
+                    np.sin(elevation),
+                ]
                 place = base_T_tag[:3, 3] + distance_m * station.base_T_room[:3, :3] @ np.array(away)
                 base_T_camera = cells.looking_at(place, base_T_tag[:3, 3] + rng.uniform(-0.1, 0.1, 3))
                 points = se3.transform_points(base_T_tag, solids.TAG.points_m)
@@ -105,15 +109,20 @@ def conditions(seed: int = 0) -> None:
             offered = runner.prepare(recording).offers()
             able = [spec for spec in specs if spec.needs <= offered]
             for answer in runner.solve(recording, able, runner.Options(seed=seed, held_out=False)):
-                rates.setdefault(answer.solver, []).extend(_predictions(station, number, answer.parent_T_camera))
+                rates.setdefault(answer.solver, []).extend(
+                    _predictions(station, number, answer.parent_T_camera)
+                )
         if not header:
             header = sorted(rates)
             print("| tag mm | spread deg | corner px | robot mm |", " | ".join(header), "|")
             print("|---" * (4 + len(header)) + "|")
         cells_text = [
-            f"{100 * np.mean(rates[name][0::2]):.0f}/{100 * np.mean(rates[name][1::2]):.0f}" for name in header
+            f"{100 * np.mean(rates[name][0::2]):.0f}/{100 * np.mean(rates[name][1::2]):.0f}"
+            for name in header
         ]
-        print(f"| {1e3 * tag_m:g} | {spread_deg:g} | {noise[0]:g} | {noise[1]:g} |", " | ".join(cells_text), "|")
+        print(
+            f"| {1e3 * tag_m:g} | {spread_deg:g} | {noise[0]:g} | {noise[1]:g} |", " | ".join(cells_text), "|"
+        )
 
 
 def noisy(
@@ -122,7 +131,9 @@ def noisy(
     """A marker recording by projection: Gaussian corners, and robot poses off by `robot_mm` and a tenth of that in deg."""
     rng = np.random.default_rng([seed, number, 5])
     carried = station.flange_tag(number)
-    carried = FlangeTag(AprilTagTarget(carried.target.family, carried.target.id, how.tag_m), carried.flange_T_tag)
+    carried = FlangeTag(
+        AprilTagTarget(carried.target.family, carried.target.id, how.tag_m), carried.flange_T_tag
+    )
     joints = np.array(recordings.tag_joints(station, number, carried, how, rng)[: how.samples])
     base_T_camera = station.camera_pose(number)
     exact = recordings.described(station, f"noisy_{number:02d}", joints, base_T_camera, how.camera)
@@ -130,7 +141,9 @@ def noisy(
     tag_poses = se3.inverse(base_T_camera) @ exact.base_T_flange @ carried.flange_T_tag
     corners = np.array([tag_edges.project(how.camera, pose, carried.target.points_m) for pose in tag_poses])
     count = len(joints), 3
-    wobble = se3.from_rotvec(np.deg2rad(rng.normal(0, 0.1 * robot_mm, count)), rng.normal(0, 1e-3 * robot_mm, count))
+    wobble = se3.from_rotvec(
+        np.deg2rad(rng.normal(0, 0.1 * robot_mm, count)), rng.normal(0, 1e-3 * robot_mm, count)
+    )
     return replace(
         exact,
         target=carried.target,

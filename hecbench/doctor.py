@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from ctypes.util import find_library
 from dataclasses import asdict, dataclass
 from importlib import metadata
 from importlib.util import find_spec
@@ -52,6 +53,7 @@ def examine() -> list[Finding]:
         *(_package(name) for name in _REQUIRED),
         _opencv_functions(),
         *(_extra(name, modules) for name, modules in _EXTRAS.items()),
+        _offscreen_graphics(),
         *(
             Finding(f"plugin {plugin.name}", plugin.status, plugin.version, plugin.detail)
             for plugin in registry.load().plugins
@@ -75,6 +77,15 @@ def _opencv_functions() -> Finding:
     complete = hasattr(cv2, "calibrateHandEye") and hasattr(cv2, "calibrateRobotWorldHandEye")
     state, cure = ("ok", "") if complete else ("missing", _OPENCV_CURE)
     return Finding("cv2.calibrateHandEye", state, cv2.__version__, cure)
+
+
+def _offscreen_graphics() -> Finding:
+    """The library with which the virtual lab draws without a display."""
+    for name in ("EGL", "OSMesa"):
+        if library := find_library(name):
+            return Finding("offscreen OpenGL", "ok", f"{name}, {library}")
+    cure = "apt install libegl1 libgl1 libgl1-mesa-dri (or libosmesa6); only pictures of the lab need it"
+    return Finding("offscreen OpenGL", "missing", cure=cure)
 
 
 def _extra(name: str, modules: tuple[str, ...]) -> Finding:

@@ -81,7 +81,7 @@ def record(
     from hecbench import recording_io
     from hecbench.specs import Kind
     from hecbench_hardware.arming import take_control
-    from hecbench_hardware.devices import FollowsRobot
+    from hecbench_hardware.devices import FollowsRobot, KnowsTruth
     from hecbench_hardware.recorder.record import Recorder
 
     if freedrive and (poses is not None or dry_run):
@@ -115,6 +115,8 @@ def record(
             report=lambda line: click.echo(line, err=True),
         )
         recording = recorder.follow_hand(_more) if freedrive else recorder.drive()
+        if isinstance(eye, KnowsTruth):
+            recording = eye.with_truth(recording)
     _print(recording, out, as_json)
 
 

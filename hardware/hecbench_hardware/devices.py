@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench.errors import HecbenchError
-from hecbench.recording import CameraModel
+from hecbench.recording import CameraModel, Recording
 from hecbench.se3 import Array
 from hecbench_hardware.kinematics import UrArm
 from hecbench_hardware.limits import Limits
@@ -206,6 +206,15 @@ class FollowsRobot(Protocol):
 
     def follow(self, robot: Robot) -> None:
         """Draw this robot from now on."""
+        ...
+
+
+@runtime_checkable
+class KnowsTruth(Protocol):
+    """A camera that knows where it stands and which pixels show the robot."""
+
+    def with_truth(self, recording: Recording) -> Recording:
+        """The recording with masks and truth, saved in its folder."""
         ...
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 
 from hecbench import se3
 from hecbench.errors import InputError
-from hecbench.recording import CameraModel
+from hecbench.recording import CameraModel, Mounting, Recording
 from hecbench.registry import hookimpl
 from hecbench.se3 import Array
 from hecbench.specs import DeviceSpec, Kind
@@ -56,6 +57,20 @@ class LabCamera:
         base_T_tag = self.base_T_workpiece @ solids.workpiece_T_tag()
         return se3.transform_points(base_T_tag, solids.TAG.points_m)
 
+    def with_truth(self, recording: Recording) -> Recording:
+        """The recording with the robot's mask of every picture and the camera's true pose, saved in its folder."""
+        from hecbench import recording_io
+
+        assert recording.joints_rad is not None
+        assert recording.folder is not None
+        masks = []
+        for joints in recording.joints_rad:
+            self.eye.scene.place(joints, self.base_T_workpiece)
+            masks.append(self.eye.mask(self.base_T_camera).astype(np.uint8) * np.uint8(255))
+        complete = replace(recording, masks=tuple(masks), truth_parent_T_camera=self.base_T_camera)
+        recording_io.save(complete, recording.folder)
+        return complete
+
     def intrinsics(self) -> CameraModel | None:
         """Exactly what it draws with."""
         camera: CameraModel = self.eye.camera
@@ -67,7 +82,7 @@ class LabCamera:
 
 
 def open_camera(options: Mapping[str, str]) -> LabCamera:
-    """The camera of one of the lab's calibrations."""
+    """The camera of one of the lab's calibrations; `cell`, a recording, gives other optics and another place."""
     from hecbench import recording_io
     from hecbench_hardware.lab import cells
     from hecbench_hardware.lab.eye import Eye, Sensor
@@ -76,11 +91,15 @@ def open_camera(options: Mapping[str, str]) -> LabCamera:
     station = cells.station(options.get("arm", "ur5e"), options.get("urdf"))
     calibration = int(number(options, "calibration", 0))
     model = cells.camera_model(int(number(options, "width", 2448)), int(number(options, "height", 2048)))
+    base_T_camera = station.camera_pose(calibration)
     if "cell" in options:
-        given = recording_io.load(Path(text(options, "cell"))).camera
-        if given is None or given.K is None:
-            raise InputError(f"cell={options['cell']}: has no camera with K to draw with")
-        model = given
+        cell = recording_io.load(Path(text(options, "cell")))
+        if cell.camera is None or cell.camera.K is None or cell.mounting is not Mounting.EYE_TO_HAND:
+            raise InputError(f"cell={options['cell']}: needs a camera with K beside the arm, eye_to_hand")
+        model = cell.camera
+        base_T_camera = (
+            cell.initial_parent_T_camera if cell.initial_parent_T_camera is not None else base_T_camera
+        )
     sensor = Sensor(int(number(options, "supersample", 2)), number(options, "noise", 0.0))
     scene = Scene(
         station.robot,
@@ -92,7 +111,7 @@ def open_camera(options: Mapping[str, str]) -> LabCamera:
         surroundings=station.surroundings,
     )
     seed = int(number(options, "seed", 0))
-    return LabCamera(Eye(scene, model, sensor), station.camera_pose(calibration), station.home_rad, seed)
+    return LabCamera(Eye(scene, model, sensor), base_T_camera, station.home_rad, seed)
 
 
 @hookimpl

@@ -31,9 +31,7 @@ _ON_PEG_RAD = 0.62
 """The finger joint at which the Robotiq's pads are as far apart as the peg is thick."""
 
 
-def planned_grasp(
-    image: Image, camera: CameraModel, seen: tags.TagPose, station: Station
-) -> Image:
+def planned_grasp(image: Image, camera: CameraModel, seen: tags.TagPose, station: Station) -> Image:
     """The picture around the tag with its outline, its axes, and the gripper where it will grasp."""
     import cv2
 
@@ -41,7 +39,9 @@ def planned_grasp(
     outline = np.rint(seen.corners_px).astype(np.int32)
     cv2.polylines(drawn, [outline], True, _TAG_RGB, 2, cv2.LINE_AA)
     half = solids.TAG.size_m / 2
-    axes = tag_edges.project(camera, seen.camera_T_tag, half * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, -1]]))
+    axes = tag_edges.project(
+        camera, seen.camera_T_tag, half * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, -1]])
+    )
     for end, colour in zip(axes[1:], ((255, 0, 0), (0, 200, 0), (0, 80, 255)), strict=True):
         cv2.line(drawn, _pixel(axes[0]), _pixel(end), colour, 2, cv2.LINE_AA)
     camera_T_workpiece = seen.camera_T_tag @ se3.inverse(solids.workpiece_T_tag())
@@ -80,9 +80,8 @@ def insertion_frames(station: Station, width: int = 480, height: int = 360) -> l
     start = tasks.above(flange, tasks.stroke_m(Task.INSERTION))
     above = station.arm.inverse(start, station.home_rad)[0]
     down = bounds.linear_path(station.arm, above, flange)
-    path = np.concatenate([bounds.joint_path(station.home_rad, above), down, down[::-1]])
-    lengths = np.cumsum(np.abs(np.diff(path, axis=0, prepend=path[:1])).sum(1) + 0.01)
-    chosen = np.searchsorted(lengths, np.linspace(lengths[0], lengths[-1], _FRAMES))
+    parts = bounds.joint_path(station.home_rad, above), down, down[::-1]
+    path = np.concatenate([part[np.linspace(0, len(part) - 1, _FRAMES // 3).astype(int)] for part in parts])
     scene = Scene(
         station.robot,
         joint_names=station.joint_names,
@@ -94,11 +93,13 @@ def insertion_frames(station: Station, width: int = 480, height: int = 360) -> l
         surroundings=station.surroundings,
     )
     look_at = base_T_workpiece[:3, 3] + [0.0, 0.0, 0.16]
-    base_T_camera = cells.looking_at(look_at + station.base_T_room[:3, :3] @ np.array([0.75, 0.55, 0.45]), look_at)
+    base_T_camera = cells.looking_at(
+        look_at + station.base_T_room[:3, :3] @ np.array([0.75, 0.55, 0.45]), look_at
+    )
     eye = Eye(scene, cells.camera_model(width, height, 0.9 * width), Sensor(2))
     frames = []
     try:
-        for joints in path[np.minimum(chosen, len(path) - 1)]:
+        for joints in path:
             scene.place(joints, base_T_workpiece, _ON_PEG_RAD if station.draws_gripper_meshes else 0.0)
             frames.append(eye.image(base_T_camera))
     finally:
@@ -110,7 +111,8 @@ def gif(frames: list[Image]) -> bytes:
     """An endless GIF."""
     from PIL import Image as PillowImage
 
-    first, *others = (PillowImage.fromarray(frame).quantize(96) for frame in frames)
+    palette = PillowImage.fromarray(np.concatenate(frames)).quantize(128)
+    first, *others = (PillowImage.fromarray(frame).quantize(palette=palette, dither=0) for frame in frames)
     stream = io.BytesIO()
     first.save(stream, "GIF", save_all=True, append_images=others, duration=_FRAME_MS, loop=0)
     return stream.getvalue()
