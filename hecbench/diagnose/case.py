@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.bundle_adjustment import Solution
-from hecbench.diagnose.fit import LEAST_SAMPLES, Fit, assumed_points, enclosing_points, fit
+from hecbench.diagnose.calibrate import assumed_points, calibrate, enclosing_points
+from hecbench.diagnose.fit import LEAST_SAMPLES, Fit
 from hecbench.errors import HecbenchError, SolverFailure
 from hecbench.recording import Mounting, Recording
 from hecbench.robot import load_robot
@@ -110,7 +111,7 @@ class Case:
     ) -> Fit | None:
         """A calibration of other poses with this case's mounting and target."""
         focal_px = focal_px or self.focal_px
-        return fit(self.recording.mounting, base_T_flange, camera_T_target, self.points_m, focal_px)
+        return calibrate(self.recording.mounting, base_T_flange, camera_T_target, self.points_m, focal_px)
 
     @cached_property
     def agreed(self) -> tuple[Fit, NDArray[np.bool_]] | None:

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
+from hecbench.diagnose.calibrate import spread
 from hecbench.diagnose.case import Case, inverted
 from hecbench.diagnose.finding import Finding, Severity
-from hecbench.diagnose.fit import spread
 
 Array = NDArray[np.float64]
 

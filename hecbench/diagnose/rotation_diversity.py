@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from hecbench import se3
+from hecbench.diagnose.calibrate import spread
 from hecbench.diagnose.case import Case
 from hecbench.diagnose.finding import Finding, Severity
-from hecbench.diagnose.fit import spread
 
 ID = "rotation_diversity"
 LEAST_ANGLE_DEG = 10.0
