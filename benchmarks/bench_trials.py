@@ -128,7 +128,7 @@ def conditions(seed: int = 0) -> None:
 def noisy(
     station: cells.Station, number: int, how: MarkerSet, corner_px: float, robot_mm: float, seed: int
 ) -> Recording:
-    """A marker recording by projection: Gaussian corners, and robot poses off by `robot_mm` and a tenth of that in deg."""
+    """A marker recording by projection, with noise on corners and robot poses (0.1 deg for each `robot_mm`)."""
     rng = np.random.default_rng([seed, number, 5])
     carried = station.flange_tag(number)
     carried = FlangeTag(

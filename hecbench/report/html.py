@@ -6,13 +6,15 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from hecbench import evidence, files, store
+from hecbench import evidence, files, store, trial_record
 from hecbench.errors import InputError
 from hecbench.estimate import Estimate, best_first
 from hecbench.evidence import Evidence
 from hecbench.report.figures import figures
 from hecbench.report.recording_figures import agreement_figure, overlays, residual_figure, scene_figure
 from hecbench.report.tables import Group, groups, table
+from hecbench.report.trials import sections as sections_of_trials
+from hecbench.trial_record import TrialRecord
 
 FILE_NAME = "report.html"
 
@@ -26,17 +28,20 @@ def write(folder: Path) -> tuple[Path, store.Contents]:
     Raises:
         InputError: the folder holds no store, or no whole result.
     """
-    contents = store.read(folder)
-    if not contents.estimates:
+    trials = trial_record.read(folder) if (folder / trial_record.FILE_NAME).is_file() else None
+    alone = trials is not None and not (folder / store.FILE_NAME).is_file()
+    contents = store.Contents([], []) if alone else store.read(folder)
+    if not contents.estimates and not alone:
         raise InputError(f"{folder}: its store holds no whole result; run again with `hecbench run --resume`")
     path = folder / FILE_NAME
     files.write_text(
         path,
         page(
             contents.estimates,
-            contents.damage,
+            [*contents.damage, *(trials.damage if trials else [])],
             f"hecbench report {folder}",
             lambda sha256: evidence.load(folder, sha256),
+            trials.trials if trials else [],
         ),
     )
     return path, contents
@@ -47,14 +52,17 @@ def page(
     damage: Sequence[str],
     command: str,
     evidence: Callable[[str], Evidence | None],
+    trials: Sequence[TrialRecord] = (),
 ) -> str:
-    """The HTML text of a report on these estimates; `evidence` gives what a run kept of a recording, by hash."""
+    """The HTML text of a report on these estimates and trials; `evidence` gives what a run kept of a recording, by
+    hash.
+    """
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     environment = Environment(
         loader=PackageLoader("hecbench.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
-    sections = [_section(group, evidence) for group in groups(estimates)]
+    sections = [_section(group, evidence) for group in groups(estimates)] + sections_of_trials(trials)
     return environment.get_template("report.html.j2").render(
         sections=sections,
         damage=damage,

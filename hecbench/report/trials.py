@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from itertools import groupby
+from typing import Any
 
 import numpy as np
 
@@ -50,6 +51,21 @@ def tables(trials: Sequence[TrialRecord]) -> list[Table]:
         if len({trial.method for trial in group}) > 1:
             found.append(_paired_table(robot, clearance_mm, group))
     return found
+
+
+def sections(trials: Sequence[TrialRecord]) -> list[dict[str, Any]]:
+    """What the HTML page shows of trials, one section for each table; the figures follow the first of an arm."""
+    found: list[dict[str, Any]] = []
+    for _, group in _grouped(trials):
+        first, *others = tables(group)
+        commands = sorted({str(t.provenance["command"]) for t in group if t.provenance.get("command")})
+        found.append(_section(first, figures(group), commands))
+        found += [_section(other, [], []) for other in others]
+    return found
+
+
+def _section(table: Table, drawn: list[str], commands: list[str]) -> dict[str, Any]:
+    return {"table": table, "figures": drawn, "commands": commands, "findings": [], "overlays": []}
 
 
 def figures(trials: Sequence[TrialRecord]) -> list[str]:

@@ -112,7 +112,10 @@ def gif(frames: list[Image]) -> bytes:
     from PIL import Image as PillowImage
 
     palette = PillowImage.fromarray(np.concatenate(frames)).quantize(128)
-    first, *others = (PillowImage.fromarray(frame).quantize(palette=palette, dither=0) for frame in frames)
+    first, *others = (
+        PillowImage.fromarray(frame).quantize(palette=palette, dither=PillowImage.Dither.NONE)
+        for frame in frames
+    )
     stream = io.BytesIO()
     first.save(stream, "GIF", save_all=True, append_images=others, duration=_FRAME_MS, loop=0)
     return stream.getvalue()
