@@ -167,7 +167,6 @@ def find_crossings(
     face_link,
     nearness,
     box,
-    shaded,
     best,
     pair,
     place,
@@ -178,8 +177,7 @@ def find_crossings(
     `best` (2, H, W) is scratch. Fills `pair` (C,) = flat index into `best` (axis, row, column), `place` (C, 2) =
     crossing t in [0, 1] between the centres and the parameter s along the edge on the screen, and `edge` (C,).
     Of several edges across a pair the outermost counts. It must not lie behind the nearer pixel and, between two
-    links, belong to the nearer. With `shaded` the edges
-    between any two faces count, not only those between parts. Returns the number found.
+    links, belong to the nearer. Returns the number found.
     """
     height, width = nearness.shape
     size = height * width
@@ -200,10 +198,6 @@ def find_crossings(
     for e in range(edge_kinds[1], edge_kinds[2]):
         order[chosen] = e
         chosen += front[edge_faces[e, 0]]
-    if shaded:
-        for e in range(edge_kinds[0]):
-            order[chosen] = e
-            chosen += front[edge_faces[e, 0]] & front[edge_faces[e, 1]]
     count = 0
     for n in range(chosen):
         e = order[n]
@@ -238,7 +232,7 @@ def find_crossings(
                     continue
                 part_p = face_part[fp] if fp >= 0 else -1
                 part_q = face_part[fq] if fq >= 0 else -1
-                if part_p == part_q and not shaded:
+                if part_p == part_q:
                     continue
                 zp, zq = depths[p], depths[q]
                 near_is_p = zp >= zq
@@ -278,7 +272,6 @@ def describe_crossings(
     place,
     edge,
     count,
-    box,
     taken,
     ends,
     link,
@@ -299,8 +292,6 @@ def describe_crossings(
     height, width = face.shape
     size = height * width
     ids = face.reshape(-1)
-    left, right = max(0, box[0] - 1), min(width - 1, box[1] + 1)
-    top, bottom = max(0, box[2] - 1), min(height - 1, box[3] + 1)
     fx, skew, cx, fy, cy = K[0], K[1], K[2], K[3], K[4]
     for n in range(count):
         axis = 0 if pair[n] < size else 1
@@ -335,65 +326,55 @@ def describe_crossings(
         if abs(k) <= _ONE:
             taken[axis * size + p] += mix[n, 0]
             taken[axis * size + q] += mix[n, 2]
-    kept = 0
     for n in range(count):
         axis = 0 if pair[n] < size else 1
-        steep = abs(slope[n]) > _ONE
-        useful = False
         for end in range(2):
-            pixel = ends[n, end]
-            here, other = taken[axis * size + pixel], taken[(1 - axis) * size + pixel]
-            if steep:
-                untouched = here == _ZERO and other == _ZERO and abs(slope[n]) < _STEEPEST
-                mixed = untouched
+            here, other = taken[axis * size + ends[n, end]], taken[(1 - axis) * size + ends[n, end]]
+            if abs(slope[n]) > _ONE:
+                mixed = here == _ZERO and other == _ZERO and abs(slope[n]) < _STEEPEST
             else:
                 mixed = other < here or (other == here and axis == 0)
             if not mixed:
                 mix[n, 2 * end], mix[n, 2 * end + 1] = _ZERO, _ZERO
-            useful |= mixed and mix[n, 2 * end + 1] > _ZERO
-        if useful:
-            ends[kept], link[kept], point[kept], gradient[kept] = ends[n], link[n], point[n], gradient[n]
-            slope[kept], mix[kept], place[kept] = slope[n], mix[n], place[n]
+    for n in range(count):
+        for end in range(2):
+            taken[ends[n, end]] = _ZERO
+            taken[size + ends[n, end]] = _ZERO
+    kept = 0
+    for n in range(count):
+        if mix[n, 1] > _ZERO or mix[n, 3] > _ZERO:
+            for k in range(4):
+                ends[kept, k], mix[kept, k] = ends[n, k], mix[n, k]
+            for k in range(3):
+                point[kept, k], gradient[kept, k] = point[n, k], gradient[n, k]
+            link[kept], slope[kept], place[kept, 0] = link[n], slope[n], place[n, 0]
             kept += 1
-    for axis in range(2):
-        for y in range(top, bottom + 1):
-            for x in range(left, right + 1):
-                taken[axis * size + y * width + x] = _ZERO
     return kept
 
 
 @_jit
-def compose(face, face_part, shade, colours, ends, mix, count, box, painted, image):
+def compose(face, face_part, colours, ends, mix, count, box, painted, image):
     """Paint `image` (H, W, 4): flat `colours` (P + 1, 4), the last the background's, mixed at edges.
 
     Only `box` and `painted`, the rectangle that the last call painted, are touched; `painted` becomes this call's.
-    `shade` (F,) scales the colours of each face; it may be empty.
     """
     height, width = face.shape
     background = len(colours) - 1
-    lit = len(shade) > 0
     for y in range(min(box[2], painted[2]), max(box[3], painted[3]) + 1):
         for x in range(min(box[0], painted[0]), max(box[1], painted[1]) + 1):
             f = face[y, x]
             part = background
-            factor = _ONE
             if f >= 0:
                 part = face_part[f]
-                if lit:
-                    factor = shade[f]
-            image[y, x, 0] = factor * colours[part, 0]
-            image[y, x, 1] = factor * colours[part, 1]
-            image[y, x, 2] = factor * colours[part, 2]
+            image[y, x, 0] = colours[part, 0]
+            image[y, x, 1] = colours[part, 1]
+            image[y, x, 2] = colours[part, 2]
             image[y, x, 3] = colours[part, 3]
     painted[0], painted[1] = max(0, box[0] - 1), min(width - 1, box[1] + 1)
     painted[2], painted[3] = max(0, box[2] - 1), min(height - 1, box[3] + 1)
-    ids = face.reshape(-1)
     for n in range(count):
         p, q = ends[n, 0], ends[n, 1]
-        shade_p = shade[ids[p]] if lit and ids[p] >= 0 else _ONE
-        shade_q = shade[ids[q]] if lit and ids[q] >= 0 else _ONE
-        for c in range(4):
-            by_p, by_q = (shade_p, shade_q) if c < 3 else (_ONE, _ONE)
-            change = by_q * colours[ends[n, 3], c] - by_p * colours[ends[n, 2], c]
-            image[p // width, p % width, c] += mix[n, 0] * change
-            image[q // width, q % width, c] -= mix[n, 2] * change
+        for k in range(4):
+            change = colours[ends[n, 3], k] - colours[ends[n, 2], k]
+            image[p // width, p % width, k] += mix[n, 0] * change
+            image[q // width, q % width, k] -= mix[n, 2] * change

@@ -104,7 +104,6 @@ class Renderer:
         self._gradient = np.zeros((capacity, 3), np.float32)
         self._slope = np.zeros(capacity, np.float32)
         self._mix = np.zeros((capacity, 4), np.float32)
-        self._shade = np.zeros(0, np.float32)
         self._count = 0
         self._image = np.zeros((*shape, 4), np.float32)
         self.nearness = np.zeros(shape, np.float32)
@@ -150,7 +149,6 @@ class Renderer:
             self._face_link,
             self.nearness,
             self.box,
-            len(self._shade) > 0,
             self._best,
             self._pair,
             self._place,
@@ -168,7 +166,6 @@ class Renderer:
             self._place,
             self._edge,
             self._count,
-            self.box,
             self._taken,
             self._ends,
             self._link,
@@ -191,7 +188,6 @@ class Renderer:
         kernels.compose(
             self.face,
             self.mesh.face_part,
-            self._shade,
             table,
             self._ends,
             self._mix,
