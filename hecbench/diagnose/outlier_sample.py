@@ -28,7 +28,11 @@ def examine(case: Case) -> tuple[Finding | None, Case]:
     odd &= ~np.isin(case.ids(np.arange(len(odd))), list(case.explained))
     if not odd.any():
         summary = f"the most different sample is {worst:.1f} times as far off as the typical one"
-        return Finding(ID, Severity.OK, summary, value=worst, limit=limit), case
+        severity = Severity.OK if worst <= limit else Severity.INFO
+        if severity is Severity.INFO:
+            i = int(found.studentised(agreeing).argmax())
+            summary += f", by {millimetres[i]:.2g} mm and {degrees[i]:.2g} deg"
+        return Finding(ID, severity, summary, value=worst, limit=limit), case
     moved = _moved_together(case, odd)
     concerned = case.ids(odd if moved is None else odd | moved)
     off = f"up to {millimetres[odd].max():.3g} mm and {degrees[odd].max():.2g} deg"
@@ -40,7 +44,8 @@ def examine(case: Case) -> tuple[Finding | None, Case]:
             "did the camera, the robot's base or the target move? record anew, or leave these samples out"
         )
         return Finding(ID, Severity.CRITICAL, summary, action, worst, limit, concerned), case
-    summary = f"sample {names(concerned)} contradicts all others: its target is displaced by {off}"
+    verb = "contradicts" if len(concerned) == 1 else "contradict"
+    summary = f"{names(concerned)} {verb} the other samples: the target is displaced by {off}"
     action = "look at its image and robot pose; leave it out or record it again"
     far = odd & ((millimetres > LIMIT_MM) | (degrees > LIMIT_DEG))
     severity = Severity.CRITICAL if far.any() else Severity.WARNING

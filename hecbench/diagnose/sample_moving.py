@@ -47,7 +47,7 @@ def _by_joints(case: Case) -> Finding | None:
     concerned = tuple(case.recording.sample_ids[i] for i in found.indices[off].tolist())
     worst = float(found.millimetres[off].max())
     summary = (
-        f"joints and robot pose of sample {names(concerned)} are of different moments: up to {worst:.2g} mm and "
+        f"joints and robot pose of {names(concerned)} are of different moments: up to {worst:.2g} mm and "
         f"{found.degrees[off].max():.2g} deg apart, elsewhere {typical_mm:.2g} mm"
     )
     return Finding(ID, Severity.CRITICAL, summary, _CURE, worst, LIMIT_MM, concerned)
@@ -74,7 +74,7 @@ def _by_stamps(case: Case) -> Finding | None:
         return Finding(ID, Severity.OK, summary, value=worst, limit=LIMIT_LAG_S)
     concerned = tuple(recording.sample_ids[i] for i in known[off].tolist())
     summary = (
-        f"image and robot pose of sample {names(concerned)} are up to {1e3 * worst:.3g} ms farther apart than usual, "
+        f"image and robot pose of {names(concerned)} are up to {1e3 * worst:.3g} ms farther apart than usual, "
         f"in which the arm moves by up to {moved_mm[off].max():.2g} mm and {moved_deg[off].max():.2g} deg"
     )
     return Finding(ID, Severity.CRITICAL, summary, _CURE, worst, LIMIT_LAG_S, concerned)
