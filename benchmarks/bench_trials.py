@@ -1,6 +1,6 @@
 """The figures of docs/trials.md: contact sweep, tag accuracy, sweeps of what decides the ranking, pictures.
 
-python benchmarks/bench_trials.py contact | tag | conditions | pictures OUT
+python benchmarks/bench_trials.py contact | tag | conditions | pictures OUT | vs060 URDF OUT
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from hecbench_hardware.trials.calibrations import predicted
 from hecbench_hardware.trials.cell import Calibration
 from hecbench_hardware.trials.tasks import Task
 
-from hecbench import registry, runner, se3
+from hecbench import registry, runner, se3, store
 from hecbench.recording import Recording
 from hecbench.specs import Kind, SolverSpec
 from hecbench.targets import AprilTagTarget
@@ -165,6 +165,20 @@ def _predictions(station: cells.Station, number: int, base_T_camera: np.ndarray 
     ]
 
 
+def vs060(urdf: str, out: Path) -> None:
+    """Marker calibrations of the VS060 by every fast solver, as a store for `hecbench trial --station vs060`."""
+    station = cells.station("vs060", urdf)
+    specs = [spec for spec in registry.load().ready(Kind.SOLVER, SolverSpec) if not spec.slow]
+    with store.writing(out, resume=False) as writer:
+        for number in range(station.calibrations):
+            recording = recordings.marker_recording(number, station=station)
+            able = [spec for spec in specs if spec.needs <= runner.prepare(recording).offers()]
+            answers = runner.solve(recording, able)
+            writer.append(
+                replace(answer, suite="lab", level="vs060", item=f"{number:06d}") for answer in answers
+            )
+
+
 def main() -> None:
     """Run what is named."""
     what = sys.argv[1] if len(sys.argv) > 1 else ""
@@ -174,6 +188,8 @@ def main() -> None:
         from hecbench_hardware.lab import pictures
 
         pictures.write(Path(sys.argv[2]))
+    elif what == "vs060" and len(sys.argv) == 4:
+        vs060(sys.argv[2], Path(sys.argv[3]))
     else:
         sys.exit(__doc__)
 
