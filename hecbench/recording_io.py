@@ -65,7 +65,7 @@ class _Charuco(_Strict, tag_field="kind", tag="charuco"):
 
 class _AprilTag(_Strict, tag_field="kind", tag="apriltag"):
     family: str
-    id: Count
+    id: Annotated[int, msgspec.Meta(ge=-1, le=100_000)]
     size_m: float
 
 
