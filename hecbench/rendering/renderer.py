@@ -109,6 +109,11 @@ class Renderer:
         self.nearness = np.zeros(shape, np.float32)
         self.face = np.full(shape, -1, np.int32)
 
+    def scale_focal(self, factor: float) -> None:
+        """From now on draw with both focal lengths (and the skew) `factor` times those of K."""
+        K = np.asarray(self.K, float)
+        self._intrinsics[[0, 1, 3]] = factor * np.array([K[0, 0], K[0, 1], K[1, 1]])
+
     def draw(self, camera_T_link: ArrayLike) -> int:
         """Rasterise the robot with its links at camera_T_link (L, 4, 4); returns the number of crossings.
 

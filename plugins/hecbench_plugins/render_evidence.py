@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from hecbench_plugins.render_views import View
 
 Array = NDArray[np.float64]
 
-_BLIND = 1e-10
+_BLIND = 1e-14
 _ROUGHNESS = 1.09
 """Measured error over the Cramer-Rao bound: a sampled picture moves less smoothly than its derivative says."""
 _HALF_TURN = np.diag([-1.0, -1.0, 1.0, 1.0])
@@ -30,6 +30,7 @@ class End:
     kind: str
     descent: stages.Descent
     photometry: stages.Photometry
+    extras: Mapping[str, Any] = field(default_factory=dict)
 
 
 def overlap(views: Sequence[View], pose: Array, trace: stages.Trace) -> float:
@@ -54,6 +55,8 @@ def answer(
     camera_T_parent = end.descent.pose
     end.photometry.huber = np.inf
     _, information, _ = end.photometry(camera_T_parent)
+    if end.extras:
+        information = end.descent.normal
     noise = end.photometry.noise()
     parent_T_camera = se3.inverse(camera_T_parent)
     covariance = None
@@ -67,7 +70,7 @@ def answer(
     if values[0] > _BLIND * values[-1]:
         carried = se3.adjoint(parent_T_camera)
         inverse = np.linalg.inv(information)
-        if end.kind == "colour":
+        if end.kind == "colour" and not end.extras:
             inverse += inverse @ end.photometry.colour_information() @ inverse
         covariance = (_ROUGHNESS * noise) ** 2 * carried @ inverse @ carried.T
         covariance = (covariance + covariance.T) / 2
@@ -84,6 +87,7 @@ def answer(
         iterations=trace.iterations,
         renders=trace.renders,
         diagnostics=diagnostics,
+        extras=end.extras,
     )
 
 

@@ -149,12 +149,14 @@ class Photometry:
     huber: float
     trace: Trace
     blur_px: float = 0.0
+    unknowns: int = field(default=6, init=False)
+    """Columns of the normal equations; the first six are the pose."""
 
     def __post_init__(self) -> None:
         self.fitted: list[PartColours | None] = [None] * len(self.views)
         shapes = [view.levels[self.level].observed.shape[:2] for view in self.views]
         count = self.channels.stop - self.channels.start
-        self._scratch = [kernels.scratch(shape[0], shape[1], count, 6) for shape in shapes]
+        self._scratch = [kernels.scratch(shape[0], shape[1], count, self.unknowns) for shape in shapes]
         self._slopes = [np.zeros((*shape, count), np.float32) for shape in shapes]
         self.residuals: list[NDArray[np.float32]] = [np.zeros(0, np.float32)] * len(self.views)
         """Of every value of the last pictures."""
@@ -178,14 +180,23 @@ class Photometry:
         return known.table
 
     def __call__(self, pose: Array) -> Step:
-        A, b, cost, crossed = np.zeros((6, 6)), np.zeros(6), 0.0, 0
+        A, b = np.zeros((self.unknowns, self.unknowns)), np.zeros(self.unknowns)
+        cost, crossed = 0.0, 0
         for index, view in enumerate(self.views):
-            at = draw(view, self.level, pose, self.trace)
+            at = self.draw(view, pose)
             crossed += len(at.renderer.crossings)
-            cost += self._add(index, at, A, b)
+            cost += self._add(index, at, self.columns(view, at.renderer.crossings, pose), A, b)
         return (cost if crossed >= _FEWEST_CROSSINGS else np.inf), A, b
 
-    def _add(self, index: int, at: Level, A: Array, b: Array) -> float:
+    def draw(self, view: View, pose: Array) -> Level:
+        """Draw one view."""
+        return draw(view, self.level, pose, self.trace)
+
+    def columns(self, view: View, crossings: Crossings, pose: Array) -> Array:
+        """How the crossings move by the unknowns (C, unknowns), px."""
+        return crossings.pose_columns()
+
+    def _add(self, index: int, at: Level, columns: Array, A: Array, b: Array) -> float:
         renderer, background = at.renderer, at.background
         table = np.zeros((len(renderer.mesh.part_names) + 1, 4), np.float32)
         table[:-1, :3] = renderer.mesh.colours if self.channels.start == 3 else self.colours(index, at)
@@ -215,7 +226,7 @@ class Photometry:
             crossings.pixels,
             crossings.mix[:, 1::2],
             change,
-            crossings.pose_columns(),
+            columns,
             image,
             observed,
             slope,

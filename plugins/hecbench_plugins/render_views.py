@@ -47,6 +47,7 @@ class Level:
 class View:
     """One sample: where the links are in the parent frame, and its pyramid."""
 
+    joints_rad: Array
     parent_T_link: Array
     levels: dict[int, Level]
     raw: Picture
@@ -55,8 +56,22 @@ class View:
     uniform_background: bool
 
 
-def prepare(recording: Recording) -> tuple[RobotModel, list[View]]:
-    """The robot and the views of a recording.
+@dataclass(frozen=True)
+class Kinematics:
+    """parent_T_link (L, 4, 4) by the joints of one sample."""
+
+    model: RobotModel
+    joint_names: tuple[str, ...]
+    parent: str
+
+    def __call__(self, joints_rad: Array) -> Array:
+        """Joints beyond their limits are taken at them."""
+        lower, upper = self.model.limits(self.joint_names).T
+        return self.model.link_poses(np.clip(joints_rad, lower, upper), self.joint_names, frame=self.parent)
+
+
+def prepare(recording: Recording) -> tuple[Kinematics, list[View]]:
+    """The moving robot and the views of a recording.
 
     Raises:
         Refusal: no intrinsics, robot, joints or pictures, or a mask without (or with nothing but) robot.
@@ -83,12 +98,14 @@ def prepare(recording: Recording) -> tuple[RobotModel, list[View]]:
     found = [view for view in views if view is not None]
     if not found:
         raise Refusal("no sample with joints has an image or a mask")
-    return model, found
+    return Kinematics(model, tuple(names), recording.parent_link), found
 
 
 def _view(
     recording: Recording, row: int, parent_T_link: Array, meshes: dict[int, RenderMesh], pinhole: Undistortion
 ) -> View | None:
+    assert recording.joints_rad is not None
+    joints_rad = recording.joints_rad[row]
     has_image = recording.images is not None and recording.images[row] is not None
     has_mask = recording.masks is not None and recording.masks[row] is not None
     if not has_image and not has_mask:
@@ -134,7 +151,7 @@ def _view(
         for level in LEVELS
     }
     full = raw if raw is not None else np.zeros((*mask.shape, 3), np.float32)
-    return View(parent_T_link, levels, full, has_image, uniform)
+    return View(joints_rad, parent_T_link, levels, full, has_image, uniform)
 
 
 def linearised(view: View, gamma: float) -> View:

@@ -22,7 +22,8 @@ from hecbench.registry import hookimpl
 from hecbench.specs import Need, SolverSpec
 from hecbench_plugins import render_evidence as evidence
 from hecbench_plugins import render_stages as stages
-from hecbench_plugins.render_views import View, linearised, prepare
+from hecbench_plugins.render_unknowns import ExtendedPhotometry, Unknown, solve
+from hecbench_plugins.render_views import Kinematics, View, linearised, prepare
 
 Array = NDArray[np.float64]
 
@@ -41,6 +42,7 @@ class RenderGN:
     """The options of the method.
 
     Attributes:
+        unknown: solved for besides the camera, each with a prior: joint offsets, scale of the robot, focal length.
         huber: residual in [0, 1] from which on a pixel's colour counts less.
         good_overlap: intersection over union of mask and drawing below which other starts are tried.
         least_overlap: the same below which the run is called a failure.
@@ -48,6 +50,7 @@ class RenderGN:
             pixels and the coverage alone decides.
     """
 
+    unknown: tuple[Unknown, ...] = ()
     huber: float = 0.3
     good_overlap: float = 0.9
     least_overlap: float = 0.6
@@ -57,7 +60,7 @@ class RenderGN:
         """Calibrate from the recording's start."""
         if recording.initial_parent_T_camera is None:
             raise Refusal("render_gn needs a start: initial_parent_T_camera, or --init FILE")
-        _, views = prepare(recording)
+        kinematics, views = prepare(recording)
         start = se3.inverse(recording.initial_parent_T_camera)
         trace = stages.Trace()
         if any(self._camera_inside(view, start, trace) for view in views):
@@ -70,7 +73,26 @@ class RenderGN:
                 f"ended where drawing and mask overlap by {overlap:.2f} only: the start is too far off or the"
                 " masks show another robot"
             )
+        if self.unknown:
+            end = self._extend(end, kinematics, trace)
         return evidence.answer(views, end, overlap, trace, _TERMINATIONS[end.descent.ended])
+
+    def _extend(self, end: evidence.End, kinematics: Kinematics, trace: stages.Trace) -> evidence.End:
+        """Solve for the other unknowns too, from where the camera alone ended."""
+        last = end.photometry
+        last(end.descent.pose)
+        wider = ExtendedPhotometry(
+            last.views,
+            last.level,
+            last.channels,
+            last.huber,
+            trace,
+            blur_px=last.blur_px,
+            kinematics=kinematics,
+            free=tuple(Unknown(unknown) for unknown in self.unknown),
+        )
+        solved = solve(wider, end.descent.pose, last.noise())
+        return evidence.End(end.kind, solved.descent, wider, solved.extras)
 
     def _camera_inside(self, view: View, pose: Array, trace: stages.Trace) -> bool:
         renderer = stages.draw(view, 4, pose, trace).renderer
