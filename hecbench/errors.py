@@ -16,6 +16,10 @@ class InputError(HecbenchError):
     exit_code = 2
 
 
+class TargetNotSeen(InputError):
+    """No image shows the target that the recording describes."""
+
+
 class Refusal(HecbenchError):
     """A solver cannot answer on this recording; the message is the reason, one sentence. Status `refused`."""
 

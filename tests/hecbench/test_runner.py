@@ -71,6 +71,16 @@ def test_solvers_see_neither_truth_nor_global_seed_and_are_labelled(exact_rig):
     assert replace(first, seconds=0).to_json() == replace(second, seconds=0).to_json()
 
 
+def test_an_unseen_target_is_a_reason_not_an_error(exact_rig):
+    """Solvers that need the target refuse with what detection said."""
+    blank = np.full((960, 1280, 3), 128, np.uint8)
+    images = (blank,) * len(exact_rig)
+    unseen = replace(exact_rig, camera_T_target=None, corners_px=None, images=images)
+    (estimate,) = runner.solve(unseen, [spec(None, {Need.TARGET_POSES})])
+    assert estimate.status is Status.REFUSED
+    assert "no image shows the chessboard" in estimate.reason
+
+
 def test_held_out_is_measured_where_there_is_no_truth(exact_rig):
     park = registry.load().get(Kind.SOLVER, "park", SolverSpec)
     (estimate,) = runner.solve(exact_rig.without_truth(), [park])

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench.errors import InputError
+from hecbench.errors import InputError, TargetNotSeen
 from hecbench.targets import ANY_TAG, AprilTagTarget
 
 Array = NDArray[np.float64]
@@ -55,7 +55,7 @@ def find(greys: list[Grey | None], target: AprilTagTarget) -> tuple[AprilTagTarg
     """The tag's corners in each picture; a target of id `ANY_TAG` becomes the only tag in view.
 
     Raises:
-        InputError: the tag is in no picture, or `ANY_TAG` does not single one out; the ids seen are listed.
+        TargetNotSeen: the tag is in no picture, or `ANY_TAG` does not single one out; the ids seen are listed.
     """
     seen = [{} if grey is None else tags(grey, target.family) for grey in greys]
     counts = Counter(tag_id for found in seen for tag_id in found)
@@ -65,7 +65,7 @@ def find(greys: list[Grey | None], target: AprilTagTarget) -> tuple[AprilTagTarg
     if tag_id not in counts:
         ids = ", ".join(f"{number} ({count}x)" for number, count in counts.most_common(8)) or "none"
         wanted = "one tag only" if tag_id == ANY_TAG else f"id {tag_id}"
-        raise InputError(
+        raise TargetNotSeen(
             f"target.id: expected {wanted} of {target.family} in {len(greys)} images, seen: {ids}; correct it"
         )
     resolved = AprilTagTarget(target.family, tag_id, target.size_m)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench.errors import InputError
+from hecbench.errors import InputError, TargetNotSeen
 from hecbench.targets import CharucoTarget
 
 Array = NDArray[np.float64]
@@ -31,7 +31,7 @@ def find(greys: Sequence[Grey | None], target: CharucoTarget) -> tuple[CharucoTa
     counts = [sum(np.isfinite(c[:, 0]).sum() for c in corners if c is not None) for corners in found]
     best = int(np.argmax(counts))
     if counts[best] == 0:
-        raise InputError(f"target: no image shows the ChArUco board; {_dictionary_in(greys, target)}")
+        raise TargetNotSeen(f"target: no image shows the ChArUco board; {_dictionary_in(greys, target)}")
     return layouts[best], found[best]
 
 

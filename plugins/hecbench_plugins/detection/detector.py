@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench.errors import InputError
+from hecbench.errors import InputError, TargetNotSeen
 from hecbench.recording import CameraModel, Recording
 from hecbench.targets import AprilTagTarget, CharucoTarget, ChessboardTarget, PointsTarget, Target
 from hecbench_plugins.detection import apriltag, charuco, chessboard, circles
@@ -31,7 +31,8 @@ def detect(recording: Recording, *, refit_intrinsics: bool = False) -> Recording
         refit_intrinsics: calibrate the camera although K is given (nominal intrinsics).
 
     Raises:
-        InputError: images or target are missing or unreadable, or no image shows the target.
+        InputError: images or target are missing or unreadable.
+        TargetNotSeen: no image shows the target.
     """
     if recording.images is None or all(image is None for image in recording.images):
         raise InputError(f"{recording.name}: has no images to detect the target in")
@@ -41,7 +42,7 @@ def detect(recording: Recording, *, refit_intrinsics: bool = False) -> Recording
     target, found, grid = _find(greys, recording.target)
     seen = [i for i, corners in enumerate(found) if corners is not None]
     if not seen:
-        raise InputError(
+        raise TargetNotSeen(
             f"{recording.name}: no image shows the {target.kind}; check its size in points, and the pictures"
         )
     corners_px = np.full((len(recording), len(target.points_m), 2), np.nan)

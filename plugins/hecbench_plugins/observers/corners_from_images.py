@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from pathlib import Path
 
-from hecbench.errors import Refusal
+from hecbench.errors import Refusal, TargetNotSeen
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Need, ObserverSpec
@@ -22,7 +22,10 @@ def corners_from_images(recording: Recording) -> Recording:
         raise Refusal(
             f"{len(absent)} images are not there, the first is {absent[0]}: the target cannot be detected"
         )
-    return detect(recording)
+    try:
+        return detect(recording)
+    except TargetNotSeen as error:
+        raise Refusal(str(error)) from error
 
 
 @hookimpl
