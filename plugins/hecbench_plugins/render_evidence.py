@@ -16,11 +16,11 @@ from hecbench_plugins.render_views import View
 
 Array = NDArray[np.float64]
 
-_BLIND = 1e-14
+_BLIND = 1e-12
 _ROUGHNESS = 1.09
 """Measured error over the Cramer-Rao bound: a sampled picture moves less smoothly than its derivative says."""
 _HALF_TURN = np.diag([-1.0, -1.0, 1.0, 1.0])
-"""About the base's vertical axis: from there a symmetric arm looks much the same."""
+"""About the root link's vertical axis: from there a symmetric arm looks much the same."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,6 +31,8 @@ class End:
     descent: stages.Descent
     photometry: stages.Photometry
     extras: Mapping[str, Any] = field(default_factory=dict)
+    covariance: Array | None = None
+    """(6, 6) of the left perturbation of camera_T_parent when more than the camera was solved for."""
 
 
 def overlap(views: Sequence[View], pose: Array, trace: stages.Trace) -> float:
@@ -54,12 +56,8 @@ def answer(
     """
     camera_T_parent = end.descent.pose
     end.photometry.huber = np.inf
-    _, information, _ = end.photometry(camera_T_parent)
-    if end.extras:
-        information = end.descent.normal
+    information = end.photometry(camera_T_parent)[1][:6, :6]
     noise = end.photometry.noise()
-    parent_T_camera = se3.inverse(camera_T_parent)
-    covariance = None
     values, directions = _scaled(information, camera_T_parent, views)
     diagnostics: dict[str, Any] = {
         "stage": end.kind,
@@ -67,19 +65,24 @@ def answer(
         "noise": noise,
         "condition": float(values[-1] / values[0]),
     }
-    if values[0] > _BLIND * values[-1]:
+    covariance = end.covariance
+    if covariance is None and values[0] > _BLIND * values[-1]:
+        covariance = np.linalg.inv(information)
+        if end.kind == "colour":
+            covariance += covariance @ end.photometry.colour_information() @ covariance
+        covariance *= (_ROUGHNESS * noise) ** 2
+    parent_T_camera = se3.inverse(camera_T_parent)
+    if covariance is not None:
         carried = se3.adjoint(parent_T_camera)
-        inverse = np.linalg.inv(information)
-        if end.kind == "colour" and not end.extras:
-            inverse += inverse @ end.photometry.colour_information() @ inverse
-        covariance = (_ROUGHNESS * noise) ** 2 * carried @ inverse @ carried.T
-        covariance = (covariance + covariance.T) / 2
+        covariance = carried @ (covariance + covariance.T) @ carried.T / 2
     diagnostics["weakest_direction"] = [round(float(part), 3) for part in directions[:, 0]]
+    parent_T_root = views[0].parent_T_link[0]
+    other_side = parent_T_root @ _HALF_TURN @ se3.inverse(parent_T_root)
     diagnostics["path"] = [
         [stage, None if np.isnan(cost) else round(cost, 6), se3.log(se3.inverse(pose)).round(6).tolist()]
         for stage, pose, cost in trace.poses
     ]
-    diagnostics["overlap_from_the_other_side"] = overlap(views, camera_T_parent @ _HALF_TURN, trace)
+    diagnostics["overlap_from_the_other_side"] = overlap(views[:1], camera_T_parent @ other_side, trace)
     return Estimate(
         parent_T_camera,
         covariance=covariance,

@@ -117,10 +117,10 @@ def _by_focal(crossings: Crossings, at: Level) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Solved:
-    """The pose, the information about it with the others eliminated, and what was found for the others."""
+    """The pose, its covariance (6, 6) with the others unknown too, and what was found for the others."""
 
     descent: stages.Descent
-    photometry: ExtendedPhotometry
+    covariance: Array
     extras: dict[str, Any]
 
 
@@ -151,7 +151,8 @@ def solve(photometry: ExtendedPhotometry, start: Array, noise: float, rounds: in
         if not better:
             damping *= 10
     _, A, _ = evaluate(pose, values)
-    covariance = noise**2 * np.linalg.inv(A)
+    size = 1 / np.sqrt(np.diag(A))
+    covariance = noise**2 * np.linalg.inv(A * np.outer(size, size)) * np.outer(size, size)
     sigmas = np.sqrt(np.diag(covariance)[6:])
     found: dict[str, Any] = {
         name: {
@@ -163,5 +164,4 @@ def solve(photometry: ExtendedPhotometry, start: Array, noise: float, rounds: in
             photometry.labels, values, sigmas, photometry.sigmas, strict=True
         )
     }
-    marginal = noise**2 * np.linalg.inv(covariance[:6, :6])
-    return Solved(stages.Descent(pose, cost, marginal, ended), photometry, found)
+    return Solved(stages.Descent(pose, cost, A, ended), covariance[:6, :6], found)

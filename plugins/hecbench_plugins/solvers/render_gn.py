@@ -92,7 +92,7 @@ class RenderGN:
             free=tuple(Unknown(unknown) for unknown in self.unknown),
         )
         solved = solve(wider, end.descent.pose, last.noise())
-        return evidence.End(end.kind, solved.descent, wider, solved.extras)
+        return evidence.End(end.kind, solved.descent, wider, solved.extras, solved.covariance)
 
     def _camera_inside(self, view: View, pose: Array, trace: stages.Trace) -> bool:
         renderer = stages.draw(view, 4, pose, trace).renderer
