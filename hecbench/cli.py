@@ -287,6 +287,19 @@ def check(recording: Path, as_json: bool) -> None:
         sys.exit(3)
 
 
+@cli.command()
+@click.argument("recording", type=_any_path)
+@click.option("--estimate", "answer", type=_file, required=True, help="An estimate of this recording.")
+@click.option("--out", type=_folder, help="Folder of the pictures; default: out/render/<recording>.")
+def render(recording: Path, answer: Path, out: Path | None) -> None:
+    """Draw the robot over the images of a RECORDING where an estimate places it."""
+    from hecbench import estimate, overlay, runner
+
+    loaded = runner.load_recording(recording)
+    written = overlay.render(loaded, estimate.load(answer), out or Path("out/render") / loaded.name)
+    click.echo(f"{written[0].parent}: {len(written)} pictures")
+
+
 @cli.command(name="import")
 @click.argument("source", type=_any_path, metavar="SRC")
 @click.argument("destination", type=_folder, metavar="DEST")
