@@ -120,7 +120,9 @@ def test_questions(control):
 
 
 def test_freedrive_by_hand(control, receive, controller):
+    wait_until(lambda: receive.getActualQ() == pytest.approx(HOME, abs=1e-4))
     controller.fault("hand 0.5 -1.4 1.5 -1.6 -1.5 0.2")
+    time.sleep(0.05)
     assert receive.getActualQ() == pytest.approx(HOME, abs=1e-4)
     assert control.freedriveMode()
     assert control.getFreedriveStatus() == 0
