@@ -12,6 +12,7 @@ from hecbench.estimate import Estimate, best_first
 from hecbench.evidence import Evidence
 from hecbench.report.figures import figures
 from hecbench.report.recording_figures import agreement_figure, overlays, residual_figure, scene_figure
+from hecbench.report.render_sections import sections as sections_of_renderers
 from hecbench.report.tables import Group, groups, table
 from hecbench.report.trials import sections as sections_of_trials
 from hecbench.trial_record import TrialRecord
@@ -62,7 +63,8 @@ def page(
     environment = Environment(
         loader=PackageLoader("hecbench.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
-    sections = [_section(group, evidence) for group in groups(estimates)] + sections_of_trials(trials)
+    sections = [_section(group, evidence) for group in groups(estimates)]
+    sections += sections_of_renderers(estimates) + sections_of_trials(trials)
     return environment.get_template("report.html.j2").render(
         sections=sections,
         damage=damage,

@@ -65,16 +65,17 @@ def answer(
         "noise": noise,
         "condition": float(values[-1] / values[0]),
     }
-    covariance = end.covariance
-    if covariance is None and values[0] > _BLIND * values[-1]:
-        covariance = np.linalg.inv(information)
+    seen_from_camera: NDArray[np.floating] | None = end.covariance
+    if seen_from_camera is None and values[0] > _BLIND * values[-1]:
+        inverse = np.linalg.inv(information)
         if end.kind == "colour":
-            covariance += covariance @ end.photometry.colour_information() @ covariance
-        covariance *= (_ROUGHNESS * noise) ** 2
+            inverse += inverse @ end.photometry.colour_information() @ inverse
+        seen_from_camera = (_ROUGHNESS * noise) ** 2 * inverse
     parent_T_camera = se3.inverse(camera_T_parent)
-    if covariance is not None:
+    covariance = None
+    if seen_from_camera is not None:
         carried = se3.adjoint(parent_T_camera)
-        covariance = carried @ (covariance + covariance.T) @ carried.T / 2
+        covariance = carried @ (seen_from_camera + seen_from_camera.T) @ carried.T / 2
     diagnostics["weakest_direction"] = [round(float(part), 3) for part in directions[:, 0]]
     parent_T_root = views[0].parent_T_link[0]
     other_side = parent_T_root @ _HALF_TURN @ se3.inverse(parent_T_root)
