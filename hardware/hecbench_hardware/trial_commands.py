@@ -40,6 +40,7 @@ _OPTIONS = [
     click.option("--supersample", type=click.IntRange(1, 8), default=2, show_default=True),
     click.option("--noise", type=click.FloatRange(min=0), default=0.0, show_default=True, help="Grey levels of 255."),
     click.option("--render/--no-render", default=True, help="Without pictures the tag's pose is exact."),
+    click.option("--dynamics", is_flag=True, help="Judge grasps by lifting the block, with dynamics."),
     click.option("--out", type=_folder, help="Default: out/trials."),
     click.option("--resume", is_flag=True, help="Go on with what --out holds."),
     click.option("--yes", is_flag=True, help="Answer every question with yes."),
@@ -77,6 +78,8 @@ def _trial(task_name: str, options: dict[str, Any]) -> None:
     from hecbench_hardware.trials import runner
     from hecbench_hardware.trials.tasks import Task
 
+    if options["dynamics"] and task_name != "grasp":
+        raise InputError("--dynamics is for grasps: insertions are judged by contact alone")
     if (options["offset_mm"] is None) == (not options["estimates"]):
         raise InputError("give either --estimate FILE or --offset-mm D")
     out = options["out"] or Path("out/trials")
@@ -145,7 +148,7 @@ def _lab_cell(options: dict[str, Any], opened: ExitStack) -> tuple[TrialCell, li
         camera = lab_camera(station, model, sensor, options["seed"])
         opened.callback(camera.close)
     take_control(robot, "trials", armed=options["arm"], confirm=lambda line: True)
-    return LabCell(station, robot, camera, options["seed"]), found, notes
+    return LabCell(station, robot, camera, options["seed"], options["dynamics"]), found, notes
 
 
 def _lab_robot(options: dict[str, Any], station: Any) -> Any:
@@ -214,7 +217,7 @@ def _size(text: str) -> tuple[int, int]:
 def _provenance(options: dict[str, Any]) -> dict[str, Any]:
     from hecbench import __version__
 
-    shown = ("robot", "station", "size", "supersample", "noise", "render")
+    shown = ("robot", "station", "size", "supersample", "noise", "render", "dynamics")
     return {"hecbench": __version__, "command": shlex.join(["hecbench", *sys.argv[1:]])} | {
         name: options[name] for name in shown
     }

@@ -15,7 +15,7 @@ from hecbench_hardware.lab.cells import Station
 from hecbench_hardware.lab.eye import Eye, Sensor
 from hecbench_hardware.lab.scene import Scene
 from hecbench_hardware.tag_edges import TagRefused
-from hecbench_hardware.trials import solids, sweep
+from hecbench_hardware.trials import physics, solids, sweep
 from hecbench_hardware.trials.cell import Calibration, NotSeen, Stroke
 from hecbench_hardware.trials.tasks import Task, Verdict
 
@@ -43,8 +43,12 @@ class LabCell:
 
     places = 3
 
-    def __init__(self, station: Station, robot: Robot, camera: LabCamera | None, seed: int = 0) -> None:
-        """Without a camera the pose of the tag is exact; `seed` draws the noise of the pictures."""
+    def __init__(
+        self, station: Station, robot: Robot, camera: LabCamera | None, seed: int = 0, dynamics: bool = False
+    ) -> None:
+        """Without a camera the pose of the tag is exact; `seed` draws the noise of the pictures; `dynamics` judges
+        grasps by lifting the block.
+        """
         self.station, self.robot, self.camera = station, robot, camera
         self.name = station.name
         self.shape, self.home_rad = station.gripper, station.home_rad
@@ -55,7 +59,7 @@ class LabCell:
         self.gripper: Gripper = gripper
         self._workpiece = station.workpiece_pose(0)
         self._camera_pose = station.camera_pose(0)
-        self._seed = seed
+        self._seed, self._dynamics = seed, dynamics
         self._setting = 0, 0
         self._seen: dict[tuple[int, int], Array] = {}
         if camera is not None:
@@ -86,8 +90,11 @@ class LabCell:
         return self._seen[self._setting]
 
     def judge(self, task: Task, stroke: Stroke, clearance_m: float) -> Verdict:
-        """By the contact sweep along the true path."""
-        return sweep.judge(task, se3.inverse(self._workpiece) @ stroke.base_T_tool, self.shape, clearance_m)
+        """By the contact sweep along the true path, or by dynamics."""
+        path = se3.inverse(self._workpiece) @ stroke.base_T_tool
+        if self._dynamics and task is Task.GRASP:
+            return physics.lift(path, self.shape)
+        return sweep.judge(task, path, self.shape, clearance_m)
 
     def truth(self) -> tuple[Array, Array]:
         """base_T_workpiece and camera_T_tag (4, 4) m."""

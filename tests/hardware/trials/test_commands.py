@@ -31,6 +31,16 @@ def estimate(station):
     )
 
 
+def test_dynamics_are_an_option_for_grasps(tmp_path):
+    given = ["--offset-mm", 0, "--no-render", "--trials", 1, "--dynamics"]
+    assert run("grasp", *given, "--out", tmp_path / "a").exit_code == 0
+    (found,) = trial_record.read(tmp_path / "a").trials
+    assert found.outcome == "success"
+    assert found.provenance["dynamics"] is True
+    with pytest.raises(InputError, match="contact alone"):
+        run("insertion", *given, "--out", tmp_path / "b")
+
+
 def run(*arguments):
     result = CliRunner().invoke(trial, [*map(str, arguments)], catch_exceptions=True)
     if isinstance(result.exception, InputError):

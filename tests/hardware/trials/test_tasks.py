@@ -81,6 +81,16 @@ def test_contact_on_the_way_fails_although_the_end_is_free():
     assert not sweep.judge(Task.GRASP, np.array([whole[0], detour, whole[-1]]), GRIPPER).success
 
 
+def test_dynamics_lift_the_block_and_lose_it_where_geometry_is_clear():
+    from hecbench_hardware.trials import physics
+
+    for shift_mm, lifted in (([0, 0, 0], True), ([10, 5, 0], True), ([0, 50, 0], False), ([0, 0, 60], False)):
+        whole = path(Task.GRASP, se3.make(np.eye(3), np.array(shift_mm) / 1e3))
+        assert (
+            physics.lift(whole, GRIPPER).success == lifted == sweep.judge(Task.GRASP, whole, GRIPPER).success
+        )
+
+
 def test_turned_gripper_is_no_grasp():
     error = se3.from_rotvec([0, 0, np.deg2rad(25)], np.zeros(3))
     assert "turn from the faces" in sweep.judge(Task.GRASP, path(Task.GRASP, error), GRIPPER).reason
