@@ -90,7 +90,7 @@ def table_one(runs: Sequence[Estimate]) -> Table:
 
 
 def _cells(numbers: Sequence[float]) -> list[str]:
-    return [f"{number:.3g}" for number in numbers]
+    return [f"{number:.0f}" if number >= 100 else f"{number:.3g}" for number in numbers]
 
 
 def descents(runs: Sequence[Estimate]) -> str | None:
