@@ -14,7 +14,6 @@ from itertools import product
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 from hecbench import se3
 from hecbench.errors import InputError
@@ -170,6 +169,8 @@ def readings(
 
 def _rotation_matrices(name: str, turn: Array) -> Array:
     """Rotations (N, 3, 3) of their numbers (N, 3 | 4 | 9) by name; angles above 2 pi are degrees."""
+    from scipy.spatial.transform import Rotation
+
     if name.startswith("matrix"):
         matrices = turn.reshape(-1, 3, 3)
         return matrices if name == "matrix" else np.swapaxes(matrices, 1, 2)

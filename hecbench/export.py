@@ -14,7 +14,6 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from hecbench import se3
 from hecbench.errors import InputError
@@ -219,6 +218,8 @@ def _transform(text: str) -> Array:
 
 def _fixed_xyz(rotation: Array) -> Array:
     """Roll, pitch, yaw; at a pitch of 90 degrees, where only their sum is known, yaw is zero."""
+    from scipy.spatial.transform import Rotation
+
     pitch = np.arctan2(-rotation[2, 0], np.hypot(rotation[0, 0], rotation[1, 0]))
     if abs(rotation[2, 0]) > 1 - 1e-12:
         roll = np.arctan2(np.sign(pitch) * rotation[0, 1], np.sign(pitch) * rotation[0, 2])

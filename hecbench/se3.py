@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
 
@@ -50,6 +49,8 @@ def hat(v: ArrayLike) -> Array:
 
 def so3_exp(rotvec: ArrayLike) -> Array:
     """Rotation matrices (..., 3, 3) of rotation vectors (..., 3) rad."""
+    from scipy.spatial.transform import Rotation
+
     rotvec = np.asarray(rotvec, float)
     matrices = Rotation.from_rotvec(rotvec.reshape(-1, 3)).as_matrix()
     return np.asarray(matrices.reshape(*rotvec.shape[:-1], 3, 3))
@@ -57,6 +58,8 @@ def so3_exp(rotvec: ArrayLike) -> Array:
 
 def so3_log(rotation: ArrayLike) -> Array:
     """Rotation vectors (..., 3) rad, of angle at most pi, of rotation matrices (..., 3, 3)."""
+    from scipy.spatial.transform import Rotation
+
     rotation = np.asarray(rotation, float)
     rotvecs = Rotation.from_matrix(rotation.reshape(-1, 3, 3)).as_rotvec()
     return np.asarray(rotvecs.reshape(*rotation.shape[:-2], 3))
@@ -150,6 +153,8 @@ def from_rotvec(rotvec: ArrayLike, translation: ArrayLike) -> Array:
 
 def from_quat_xyzw(quaternion: ArrayLike, translation: ArrayLike) -> Array:
     """Transforms of quaternions (..., 4) in the order x, y, z, w (ROS, scipy) and translations (..., 3) m."""
+    from scipy.spatial.transform import Rotation
+
     quaternion = np.asarray(quaternion, float)
     matrices = Rotation.from_quat(quaternion.reshape(-1, 4)).as_matrix()
     return make(matrices.reshape(*quaternion.shape[:-1], 3, 3), translation)
@@ -162,6 +167,8 @@ def from_quat_wxyz(quaternion: ArrayLike, translation: ArrayLike) -> Array:
 
 def to_quat_xyzw(a_T_b: ArrayLike) -> Array:
     """Quaternions (..., 4) in the order x, y, z, w with w >= 0 of transforms (..., 4, 4)."""
+    from scipy.spatial.transform import Rotation
+
     a_T_b = np.asarray(a_T_b, float)
     matrices = a_T_b[..., :3, :3].reshape(-1, 3, 3)
     quaternions = Rotation.from_matrix(matrices).as_quat(canonical=True)

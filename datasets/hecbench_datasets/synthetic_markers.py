@@ -30,7 +30,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from hecbench import se3
 from hecbench.recording import CameraModel, Mounting, Recording
@@ -141,6 +140,8 @@ def _camera_looking_at_workspace(distance_m: float, rng: np.random.Generator) ->
 
 
 def _random_rotation(rng: np.random.Generator) -> Array:
+    from scipy.spatial.transform import Rotation
+
     return np.asarray(Rotation.random(random_state=rng).as_matrix())
 
 

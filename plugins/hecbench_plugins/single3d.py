@@ -13,7 +13,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from hecbench import se3
 from hecbench.errors import Refusal, SolverFailure
@@ -139,6 +138,8 @@ def iterate(positions: MarkerPositions) -> tuple[Array, int]:
     Gauss-Newton from the closed form and from the best of the 24 rotations of a cube: where the closed form
     is useless, the second start is not.
     """
+    from scipy.spatial.transform import Rotation
+
     e = positions.eliminated
     cube = Rotation.create_group("O").as_matrix()
     best_cube = min(cube, key=lambda rotation: _cost(e, rotation))

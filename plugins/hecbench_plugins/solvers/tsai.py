@@ -6,7 +6,6 @@ from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from hecbench import se3
 from hecbench.errors import Refusal
@@ -64,6 +63,8 @@ def _require_usable_pairs(pairs: PosePairs) -> int:
 
 def _nearest_cube_rotation(rotation: NDArray[np.float64]) -> NDArray[np.float64]:
     """The transform (4, 4) of the one of the cube's 24 rotations that is nearest to a rotation (3, 3)."""
+    from scipy.spatial.transform import Rotation
+
     cube = Rotation.create_group("O").as_matrix()
     return se3.make(cube[np.argmax(np.einsum("kij,ij->k", cube, rotation))], np.zeros(3))
 
