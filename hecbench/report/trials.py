@@ -69,11 +69,16 @@ def _section(table: Table, drawn: list[str], commands: list[str]) -> dict[str, A
 
 
 def figures(trials: Sequence[TrialRecord]) -> list[str]:
-    """SVG text for each arm and clearance: success against the error at the workpiece, and the margins."""
+    """SVG text for each arm and clearance: success against TRE and error at the workpiece, and the margins."""
     found = []
     for (robot, clearance_mm), group in _grouped(trials):
         title = _title(robot, clearance_mm)
-        found += [success_against_error(group, title), margins(group, title)]
+        tre = [(t, t.calibration_errors["tre_mm"]) for t in group if "tre_mm" in t.calibration_errors]
+        workpiece = [(t, t.object_error_mm) for t in group if t.object_error_mm is not None]
+        for name, errors in (("TRE of the calibration", tre), ("error at the workpiece", workpiece)):
+            if errors:
+                found.append(success_against(errors, name, title))
+        found.append(margins(group, title))
     return found
 
 
@@ -157,14 +162,14 @@ def _paired_table(robot: str, clearance_mm: float, trials: Sequence[TrialRecord]
     return Table(f"{best} against each, {robot}, {clearance_mm:g} mm", header, tuple(rows), (note,))
 
 
-def success_against_error(trials: Sequence[TrialRecord], title: str) -> str:
-    """Share of successes in classes of how far the workpiece was from where it was believed to be."""
+def success_against(trials: Sequence[tuple[TrialRecord, float]], name: str, title: str) -> str:
+    """Share of successes, with Wilson's intervals, in classes of an error in mm."""
     figure, (axes,) = panel(7.0, 3.4, 1)
     edges = np.array([0.0, 0.5, 1, 1.5, 2, 3, 5, 10, 15, 20, 30, 50, 100])
     for number, task in enumerate(TASKS):
-        known = [t for t in trials if t.task == task and t.object_error_mm is not None]
-        errors = np.array([t.object_error_mm for t in known], float)
-        success = np.array([t.outcome is Outcome.SUCCESS for t in known])
+        known = [(trial, error) for trial, error in trials if trial.task == task]
+        errors = np.array([error for _, error in known])
+        success = np.array([trial.outcome is Outcome.SUCCESS for trial, _ in known])
         which = np.clip(np.digitize(errors, edges) - 1, 0, len(edges) - 1)
         for place in np.unique(which):
             chosen = success[which == place]
@@ -173,9 +178,8 @@ def success_against_error(trials: Sequence[TrialRecord], title: str) -> str:
             axes.plot([x, x], [interval.low, interval.high], color=COLOURS[number], linewidth=2, alpha=0.5)
             label = task if place == which.min() else None
             axes.plot([x], [interval.value], "os"[number], color=COLOURS[number], label=label)
-    axes.set(
-        xscale="symlog", xlabel="error at the workpiece, mm", ylabel="share of successes", ylim=(-0.03, 1.03)
-    )
+    axes.set(xscale="symlog", xlabel=f"{name}, mm", ylabel="share of successes", ylim=(-0.03, 1.03))
+    axes.xaxis.set_major_formatter("{x:g}")
     axes.set_title(title)
     axes.legend(frameon=False)
     axes.grid(True, alpha=0.25)
@@ -196,6 +200,7 @@ def margins(trials: Sequence[TrialRecord], title: str) -> str:
     axes.axvline(0.0, color="#1c2733", linewidth=0.8)
     axes.set_yticks(range(len(methods)), methods)
     axes.set_xscale("symlog", linthresh=1.0)
+    axes.xaxis.set_major_formatter("{x:g}")
     axes.set(xlabel="margin, mm", title=title)
     axes.legend(frameon=False, loc="center left", bbox_to_anchor=(1.01, 0.5))
     axes.grid(True, axis="x", alpha=0.25)
