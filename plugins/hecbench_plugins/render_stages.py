@@ -1,4 +1,4 @@
-"""The stages of `render_gn`: centroid and area, silhouette, photometry, intervals of the mask.
+"""The stages of `render_gn`: centroid and area, silhouette, photometry.
 
 All turn camera_T_parent by left perturbations [phi rad, rho m] in the camera frame and stack every view.
 """
@@ -20,16 +20,13 @@ Array = NDArray[np.float64]
 Step = tuple[float, Array, Array]
 """Cost, J'WJ (6, 6) and -J'Wr (6,)."""
 
-_SMALL_STEP = 2e-6
+SMALL_STEP = 2e-6
 _FEWEST_CROSSINGS = 30
 _FEWEST_PURE = 10
 _FEWEST_PARTS = 4
 _ANY_COLOUR = 10.0
 _DARKEST = 0.02
 _TONE_MISFIT = 0.05
-_MASK_REACH_PX = 2
-_VIOLATION_CLIP_PX = 0.1
-_COVERAGE_WEIGHT = 0.02
 
 
 @dataclass
@@ -344,7 +341,7 @@ def descend(
     iterations: int,
     trace: Trace,
     stage: str,
-    small: float = _SMALL_STEP,
+    small: float = SMALL_STEP,
 ) -> Descent:
     """Levenberg-Marquardt with Marquardt's scaling; a step that does not lower the cost is taken back."""
     damping, pose = 1e-3, start
@@ -372,57 +369,3 @@ def descend(
             if damping > 1e4:
                 return Descent(pose, cost, A, "stalled")
     return Descent(pose, cost, A, "iterations")
-
-
-def between_pixels(
-    views: Sequence[View], photometry: Photometry, start: Array, trace: Trace, rounds: int = 30
-) -> tuple[Array, float]:
-    """The pose whose contour passes between the pixel centres where the given masks change.
-
-    A mask of pixels says no more than on which side of the contour each centre lies; a contour that passes between
-    the two centres is right wherever it passes. Only violations of these intervals count, besides the coverage with
-    a small weight that picks the middle. Returns the pose and the share of violated intervals.
-    """
-    pose, share = start, 1.0
-    for _ in range(rounds):
-        _, A, b = photometry(pose)
-        A, b = _COVERAGE_WEIGHT * A, _COVERAGE_WEIGHT * b
-        violated = total = 0
-        for view in views:
-            residual, rows = _violations(view.levels[1])
-            kernels.row_weights(rows[residual != 0], residual[residual != 0], _VIOLATION_CLIP_PX, A, b)
-            violated += int((residual != 0).sum())
-            total += len(residual)
-        share = violated / max(total, 1)
-        move = 0.5 * np.linalg.solve(A + 1e-6 * np.diag(np.diag(A)), b)
-        pose = se3.exp(move) @ pose
-        trace.iterations += 1
-        trace.poses.append(("intervals/1", pose.copy(), share))
-        if np.abs(move).max() < _SMALL_STEP:
-            break
-    return pose, share
-
-
-def _violations(at: Level) -> tuple[Array, Array]:
-    """How far (n,) px contour crossings lie off the nearest change of the mask along their pair, and rows (n, 6)."""
-    crossings = at.renderer.crossings
-    height, width = at.observed.shape[:2]
-    p = crossings.pixels[:, 0]
-    y, x = p // width, p % width
-    reach = _MASK_REACH_PX + 1
-    inside = (x >= reach) & (x < width - reach - 1) & (y >= reach) & (y < height - reach - 1)
-    chosen = np.flatnonzero(inside & (crossings.parts < 0).any(1) & (np.abs(crossings.slope) <= 1))
-    steps = np.arange(-_MASK_REACH_PX, _MASK_REACH_PX + 1)
-    stride = crossings.pixels[chosen, 1] - p[chosen]
-    place = p[chosen, None] + stride[:, None] * steps
-    mask = at.observed[..., 3].reshape(-1) > 0.5
-    before, after = mask[place], mask[place + stride[:, None]]
-    leaves = (crossings.parts[chosen, 0] >= 0)[:, None]
-    changes = np.where(leaves, before & ~after, ~before & after)
-    t = crossings.t[chosen, None].astype(float)
-    off = np.minimum(t - steps, 0) + np.maximum(t - steps - 1, 0)
-    off = np.where(changes, off, np.inf)
-    nearest = np.abs(off).argmin(1)[:, None]
-    residual = np.take_along_axis(off, nearest, 1)[:, 0]
-    found = np.isfinite(residual)
-    return residual[found], crossings.pose_columns()[chosen][found]

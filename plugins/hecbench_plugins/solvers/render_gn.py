@@ -22,6 +22,7 @@ from hecbench.registry import hookimpl
 from hecbench.specs import Need, SolverSpec
 from hecbench_plugins import render_evidence as evidence
 from hecbench_plugins import render_stages as stages
+from hecbench_plugins.render_intervals import between_pixels
 from hecbench_plugins.render_unknowns import ExtendedPhotometry, Unknown, solve
 from hecbench_plugins.render_views import Kinematics, View, linearised, prepare
 
@@ -33,7 +34,6 @@ _TERMINATIONS = {
     "iterations": Termination.MAX_ITERATIONS,
 }
 _BLURS_PX = (0.5, 0.75, 1.0, 1.25, 1.5, 2.0)
-_BLUR_GAIN = 1.0
 _RESTART_TURNS_DEG = ((0, 0, 0), (0, 0, 25), (0, 0, -25), (0, 20, 0), (0, -20, 0), (20, 0, 0), (-20, 0, 0))
 
 
@@ -131,14 +131,14 @@ class RenderGN:
                 pose = descent.pose
             for blur in _BLURS_PX:
                 blurred = stages.Photometry(views, 1, slice(0, 3), self.huber, trace, blur_px=blur)
-                if blurred(pose)[0] > _BLUR_GAIN * descent.cost:  # costs are negative: the lower the better
+                if blurred(pose)[0] > descent.cost:
                     break
                 descent = stages.descend(blurred, pose, 20, trace, f"blur {blur}/1")
                 pose, photometry = descent.pose, blurred
             return evidence.End("colour", descent, photometry)
         coverage = stages.Photometry(views, 1, slice(3, 4), self.huber, trace)
         descent = stages.descend(coverage, pose, 20, trace, "coverage/1")
-        pose, violated = stages.between_pixels(views, coverage, descent.pose, trace)
+        pose, violated = between_pixels(views, coverage, descent.pose, trace)
         if violated > self.most_violated:
             return evidence.End("coverage", descent, coverage)
         return evidence.End("intervals", replace(descent, pose=pose), coverage)
