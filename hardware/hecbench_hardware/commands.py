@@ -87,14 +87,16 @@ def record(
     if freedrive and (poses is not None or dry_run):
         raise InputError("--freedrive has no plan: leave --poses and --dry-run out")
     plan = recording_io.load(cell)
-    given = _settings(settings)
+    given = device_settings(settings)
     extra = {"host": host, "limits": None if limits is None else str(limits)}
     with ExitStack() as open_devices:
         eye = None
         if camera != "none" and not dry_run:
-            eye = _open(Kind.CAMERA, camera, given["camera"])
+            eye = open_device(Kind.CAMERA, camera, given["camera"])
             open_devices.callback(eye.close)
-        device = _open(Kind.ROBOT, robot, given["robot"] | {k: v for k, v in extra.items() if v is not None})
+        device = open_device(
+            Kind.ROBOT, robot, given["robot"] | {k: v for k, v in extra.items() if v is not None}
+        )
         open_devices.callback(device.close)
         if isinstance(eye, FollowsRobot):
             eye.follow(device)
@@ -120,19 +122,20 @@ def record(
     _print(recording, out, as_json)
 
 
-def _settings(pairs: tuple[str, ...]) -> dict[str, dict[str, str]]:
-    """Options by device from ``robot.x=1``, ``camera.y=2``."""
-    found: dict[str, dict[str, str]] = {"robot": {}, "camera": {}}
+def device_settings(pairs: tuple[str, ...]) -> dict[str, dict[str, str]]:
+    """Options by device from ``robot.x=1``, ``camera.y=2``, ``gripper.z=3``."""
+    found: dict[str, dict[str, str]] = {"robot": {}, "camera": {}, "gripper": {}}
     for pair in pairs:
         key, separator, value = pair.partition("=")
         device, dot, name = key.partition(".")
         if not separator or not dot or device not in found:
-            raise InputError(f"--set {pair}: write robot.NAME=VALUE or camera.NAME=VALUE")
+            raise InputError(f"--set {pair}: write robot.NAME=VALUE, camera.NAME=VALUE or gripper.NAME=VALUE")
         found[device][name] = value
     return found
 
 
-def _open(kind: Kind, name: str, options: Mapping[str, str]) -> Any:
+def open_device(kind: Kind, name: str, options: Mapping[str, str]) -> Any:
+    """Open a device by name; an option that it does not take is refused."""
     from hecbench import registry
     from hecbench.specs import DeviceSpec
 

@@ -154,14 +154,14 @@ def _lab_cell(options: dict[str, Any], opened: ExitStack) -> tuple[TrialCell, li
 def _lab_robot(options: dict[str, Any], station: Any) -> Any:
     """The lab's own arm, or the UR driver on a simulated controller with the lab's limits."""
     from hecbench.specs import Kind
-    from hecbench_hardware.commands import _open, _settings
+    from hecbench_hardware.commands import device_settings, open_device
     from hecbench_hardware.lab.arm import LabRobot
 
     if options["robot"] == "lab":
         return LabRobot(station)
-    given = _settings(options["settings"])["robot"]
+    given = device_settings(options["settings"])["robot"]
     host = {} if options["host"] is None else {"host": options["host"]}
-    robot = _open(Kind.ROBOT, options["robot"], {"max_age_s": "2", **given, **host})
+    robot = open_device(Kind.ROBOT, options["robot"], {"max_age_s": "2", **given, **host})
     if robot.arm.name != station.name:
         robot.close()
         raise InputError(
@@ -172,9 +172,10 @@ def _lab_robot(options: dict[str, Any], station: Any) -> Any:
 
 
 def _real_cell(options: dict[str, Any], opened: ExitStack) -> tuple[TrialCell, list[Calibration], list[str]]:
-    from hecbench.specs import Kind
+    from hecbench import registry
+    from hecbench.specs import DeviceSpec, Kind
     from hecbench_hardware.arming import take_control
-    from hecbench_hardware.commands import _open, _settings
+    from hecbench_hardware.commands import device_settings, open_device
     from hecbench_hardware.trials import calibrations, solids
     from hecbench_hardware.trials.real_cell import RealCell
 
@@ -187,13 +188,16 @@ def _real_cell(options: dict[str, Any], opened: ExitStack) -> tuple[TrialCell, l
     model = next((item.estimate.camera for item in found if item.estimate), None)
     if model is None:
         raise InputError(f"{options['estimates'][0]}: has no answer with a camera: calibrate again")
-    settings = _settings(options["settings"])
-    camera = _open(Kind.CAMERA, options["camera"], settings["camera"])
+    settings = device_settings(options["settings"])
+    camera = open_device(Kind.CAMERA, options["camera"], settings["camera"])
     opened.callback(camera.close)
     host = {} if options["host"] is None else {"host": options["host"]}
-    gripper = _open(Kind.GRIPPER, options["gripper"], host)
+    takes_host = "host" in registry.load().get(Kind.GRIPPER, options["gripper"], DeviceSpec).options
+    gripper = open_device(
+        Kind.GRIPPER, options["gripper"], (host if takes_host else {}) | settings["gripper"]
+    )
     opened.callback(gripper.close)
-    robot = _open(Kind.ROBOT, options["robot"], settings["robot"] | host)
+    robot = open_device(Kind.ROBOT, options["robot"], settings["robot"] | host)
     opened.callback(robot.close)
 
     def ask(line: str) -> bool:
