@@ -52,7 +52,8 @@ def test_exact_data_on_1000_rigs(benchmark):
             estimate
             for i in range(1000)
             for estimate in runner.solve(
-                exact_recording(rng, list(Mounting)[i % 2], rng.integers(5, 21), rng.uniform(20, 180)), specs()
+                exact_recording(rng, list(Mounting)[i % 2], rng.integers(5, 21), rng.uniform(20, 180)),
+                specs(),
             )
         ]
 
@@ -110,4 +111,6 @@ def test_rate_of_10000_recordings(jobs, benchmark, tmp_path):
         lambda: runner.run(tasks, options, out=tmp_path / "run", jobs=jobs), rounds=1
     )
     seconds = time.perf_counter() - start
-    print(f"\n--jobs {jobs}: {len(contents.estimates)} calibrations, {len(contents.estimates) / seconds:.0f} per s")
+    print(
+        f"\n--jobs {jobs}: {len(contents.estimates)} calibrations, {len(contents.estimates) / seconds:.0f} per s"
+    )

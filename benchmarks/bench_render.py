@@ -13,8 +13,8 @@ import numpy as np
 import pytest
 from hecbench_datasets import synthetic
 from hecbench_plugins import render_stages
+from hecbench_plugins.render_gn import RenderGN
 from hecbench_plugins.render_views import prepare
-from hecbench_plugins.solvers.render_gn import RenderGN
 
 from hecbench import se3
 from hecbench.recording_io import load

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hecbench_datasets import synthetic
+from hecbench_plugins.render_gn import RenderGN
 from hecbench_plugins.render_unknowns import PRIOR, Unknown
-from hecbench_plugins.solvers.render_gn import RenderGN
 
 from hecbench import se3
 from hecbench.recording import CameraModel

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,8 @@ def held_out(
 
     X is the solver's on the training folds. The ruler itself refits Y = other_T_target there with the raw
     robot poses, identically for every solver, and predicts ``inverse(X) @ H @ Y`` for the left-out samples. A
-    fold on which the solver gives no answer is counted in `failed_folds` and predicts nothing.
+    fold on which the solver gives no answer is counted in `failed_folds` and predicts nothing. Pixels are predicted with the camera
+    of the estimate: the recording's, unless the solver calibrates intrinsics too.
     """
     hand = recording.hand_poses()
     assert recording.camera_T_target is not None
@@ -49,8 +51,9 @@ def held_out(
             failed += 1
             continue
         assert fitted.parent_T_camera is not None
-        other_T_target = refit_target(fitted.parent_T_camera, recording.subset(training))
-        residuals += [_residuals(fitted.parent_T_camera, other_T_target, recording, i) for i in fold.tolist()]
+        seen_by = replace(recording, camera=fitted.camera or recording.camera)
+        other_T_target = refit_target(fitted.parent_T_camera, seen_by.subset(training))
+        residuals += [_residuals(fitted.parent_T_camera, other_T_target, seen_by, i) for i in fold.tolist()]
     found: dict[str, Any] = {"folds": len(folds), "failed_folds": failed, "samples": len(residuals)}
     for name, values in zip(
         ("reprojection_px", "target_mm", "target_deg"), np.array(residuals).T, strict=False

@@ -1,0 +1,141 @@
+"""Second-order alignment of a rendered robot with pictures of it: Gauss-Newton on silhouette, colours and edges.
+
+Coarse to fine on one CPU core: translation from centroid and area of the mask; the drawn contour against the
+signed distance of the mask's contour; the anti-aliased picture of flat parts, one colour per part estimated
+within the loop. Before a textured background the mask takes the place of the colours: its coverage, then the intervals
+between pixel centres through which its contour must pass.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hecbench import se3
+from hecbench.errors import Refusal, SolverFailure
+from hecbench.estimate import Estimate, Termination
+from hecbench.recording import Recording
+from hecbench_plugins import render_evidence as evidence
+from hecbench_plugins import render_stages as stages
+from hecbench_plugins.render_intervals import between_pixels
+from hecbench_plugins.render_unknowns import ExtendedPhotometry, Unknown, solve
+from hecbench_plugins.render_views import Kinematics, View, linearised, prepare
+
+Array = NDArray[np.float64]
+
+_TERMINATIONS = {
+    "converged": Termination.CONVERGED,
+    "stalled": Termination.STALLED,
+    "iterations": Termination.MAX_ITERATIONS,
+}
+_BLURS_PX = (0.5, 0.75, 1.0, 1.25, 1.5, 2.0)
+_RESTART_TURNS_DEG = ((0, 0, 0), (0, 0, 25), (0, 0, -25), (0, 20, 0), (0, -20, 0), (20, 0, 0), (-20, 0, 0))
+
+
+@dataclass(frozen=True)
+class RenderGN:
+    """The options of the method.
+
+    Attributes:
+        unknown: solved for besides the camera, each with a prior: joint offsets, scale of the robot, focal length.
+        huber: residual in [0, 1] from which on a pixel's colour counts less.
+        good_overlap: intersection over union of mask and drawing below which other starts are tried.
+        least_overlap: the same below which the run is called a failure.
+        most_violated: share of the contour beside the mask's changes above which the mask is not one of sampled
+            pixels and the coverage alone decides.
+    """
+
+    unknown: tuple[Unknown, ...] = ()
+    huber: float = 0.3
+    good_overlap: float = 0.9
+    least_overlap: float = 0.6
+    most_violated: float = 0.25
+
+    def __call__(self, recording: Recording, *, rng: np.random.Generator) -> Estimate:
+        """Calibrate from the recording's start."""
+        if recording.initial_parent_T_camera is None:
+            raise Refusal("render_gn needs a start: initial_parent_T_camera, or --init FILE")
+        kinematics, views = prepare(recording)
+        start = se3.inverse(recording.initial_parent_T_camera)
+        trace = stages.Trace()
+        if any(self._camera_inside(view, start, trace) for view in views):
+            raise Refusal("at the start the camera is inside the robot: check its units and direction")
+        coarse = self._align(views, start, trace)
+        end = self._refine(views, coarse, trace)
+        overlap = evidence.overlap(views, end.descent.pose, trace)
+        if overlap < self.least_overlap:
+            raise SolverFailure(
+                f"ended where drawing and mask overlap by {overlap:.2f} only: the start is too far off or the"
+                " masks show another robot"
+            )
+        if self.unknown:
+            end = self._extend(end, kinematics, trace)
+        return evidence.answer(views, end, overlap, trace, _TERMINATIONS[end.descent.ended])
+
+    def _extend(self, end: evidence.End, kinematics: Kinematics, trace: stages.Trace) -> evidence.End:
+        """Solve for the other unknowns too, from where the camera alone ended."""
+        last = end.photometry
+        last(end.descent.pose)
+        wider = ExtendedPhotometry(
+            last.views,
+            last.level,
+            last.channels,
+            last.huber,
+            trace,
+            blur_px=last.blur_px,
+            kinematics=kinematics,
+            free=tuple(Unknown(unknown) for unknown in self.unknown),
+        )
+        solved = solve(wider, end.descent.pose, last.noise())
+        return evidence.End(end.kind, solved.descent, wider, solved.extras, solved.covariance)
+
+    def _camera_inside(self, view: View, pose: Array, trace: stages.Trace) -> bool:
+        renderer = stages.draw(view, 4, pose, trace).renderer
+        covered = (renderer.face >= 0).mean()
+        return renderer.dropped > 0 and covered > 0.9
+
+    def _align(self, views: list[View], start: Array, trace: stages.Trace) -> Array:
+        """The best of silhouette alignments from turned starts; the first good one ends the search."""
+        best, best_overlap = start, -1.0
+        for turn in _RESTART_TURNS_DEG:
+            pose = start.copy()
+            pose[:3, :3] = se3.so3_exp(np.deg2rad(turn)) @ start[:3, :3]
+            pose = stages.centroid_and_area(views, pose, trace)
+            for level, clip, rounds in ((4, 15.0, 25), (2, 6.0, 12)):
+                step = stages.silhouette_step(views, level, stages.distances_at(views, level), clip, trace)
+                pose = stages.descend(step, pose, rounds, trace, f"silhouette/{level}", small=1e-4).pose
+            overlap = evidence.overlap(views, pose, trace)
+            if overlap > best_overlap:
+                best, best_overlap = pose, overlap
+            if overlap > self.good_overlap:
+                break
+        return best
+
+    def _refine(self, views: list[View], pose: Array, trace: stages.Trace) -> evidence.End:
+        """Photometry where flat colours explain the pictures, else coverage and the intervals of the masks."""
+        if all(view.has_image and view.uniform_background for view in views):
+            for level, rounds in ((4, 8), (2, 8), (1, 20)):
+                photometry = stages.Photometry(views, level, slice(0, 3), self.huber, trace)
+                descent = stages.descend(photometry, pose, rounds, trace, f"colour/{level}")
+                pose = descent.pose
+            exponent = stages.tone_exponent(photometry)
+            if exponent != 1.0:
+                views = [linearised(view, exponent) for view in views]
+                photometry = stages.Photometry(views, 1, slice(0, 3), self.huber, trace)
+                descent = stages.descend(photometry, pose, 20, trace, f"tone {exponent:.2f}/1")
+                pose = descent.pose
+            for blur in _BLURS_PX:
+                blurred = stages.Photometry(views, 1, slice(0, 3), self.huber, trace, blur_px=blur)
+                if blurred(pose)[0] > descent.cost:
+                    break
+                descent = stages.descend(blurred, pose, 20, trace, f"blur {blur}/1")
+                pose, photometry = descent.pose, blurred
+            return evidence.End("colour", descent, photometry)
+        coverage = stages.Photometry(views, 1, slice(3, 4), self.huber, trace)
+        descent = stages.descend(coverage, pose, 20, trace, "coverage/1")
+        pose, violated = between_pixels(views, coverage, descent.pose, trace)
+        if violated > self.most_violated:
+            return evidence.End("coverage", descent, coverage)
+        return evidence.End("intervals", replace(descent, pose=pose), coverage)
