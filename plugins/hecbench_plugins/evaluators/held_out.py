@@ -33,8 +33,8 @@ def held_out(
 
     X is the solver's on the training folds. The ruler itself refits Y = other_T_target there with the raw
     robot poses, identically for every solver, and predicts ``inverse(X) @ H @ Y`` for the left-out samples. A
-    fold on which the solver gives no answer is counted in `failed_folds` and predicts nothing. Pixels are predicted with the camera
-    of the estimate: the recording's, unless the solver calibrates intrinsics too.
+    fold on which the solver gives no answer is counted in `failed_folds` and predicts nothing. Pixels are predicted
+    with the camera of the estimate: the recording's, unless the solver calibrates intrinsics too.
     """
     hand = recording.hand_poses()
     assert recording.camera_T_target is not None
