@@ -22,18 +22,19 @@ import zlib
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import ndimage
-from scipy.spatial.transform import Rotation
 
 from hecbench import se3
 from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
 from hecbench.registry import hookimpl
-from hecbench.rendering import Renderer, RenderMesh
 from hecbench.robot import RobotModel, load_robot
 from hecbench.specs import SuiteSpec
+
+if TYPE_CHECKING:
+    from hecbench.rendering import RenderMesh
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.float32]
@@ -79,7 +80,15 @@ def _noise(picture: Picture, rng: np.random.Generator) -> Picture:
     return np.concatenate([np.clip(noisy, 0, 1), picture[..., 3:]], -1)
 
 
+def _blurred(rgb: Picture) -> Picture:
+    from scipy import ndimage
+
+    return np.asarray(ndimage.gaussian_filter(rgb, (1, 1, 0)))
+
+
 def _ragged_mask(picture: Picture, rng: np.random.Generator) -> Picture:
+    from scipy import ndimage
+
     width, grow = int(rng.integers(1, 4)), bool(rng.integers(2))
     change = ndimage.binary_dilation if grow else ndimage.binary_erosion
     mask = change(picture[..., 3] >= 0.5, iterations=width)
@@ -100,7 +109,7 @@ def _occluded(picture: Picture, rng: np.random.Generator) -> Picture:
 CHANGES: dict[str, Change] = {
     "gain": _colours(lambda rgb: 1.2 * rgb),
     "gamma": _colours(lambda rgb: rgb**0.7),
-    "blur": _colours(lambda rgb: ndimage.gaussian_filter(rgb, (1, 1, 0))),
+    "blur": _colours(_blurred),
     "noise": _noise,
     "ragged_mask": _ragged_mask,
     "occlusion": _occluded,
@@ -115,12 +124,16 @@ LEVELS = (*START_RANGES_M, *MISMATCH, *CHANGES, "colours", "joint_noise", *VIEWS
 @lru_cache(maxsize=1)
 def robot_and_mesh() -> tuple[RobotModel, RenderMesh]:
     """The robot that the suite draws."""
+    from hecbench.rendering import RenderMesh
+
     model = load_robot(ROBOT)
     return model, RenderMesh.of(model)
 
 
 def scene(level: str, index: int, seed: int) -> Scene:
     """What `make` draws; see the module's docstring."""
+    from scipy.spatial.transform import Rotation
+
     start_level = level if level in START_RANGES_M else "LP"
     rng = np.random.default_rng([seed, zlib.crc32(start_level.encode()), index])
     K = np.array([[FOCAL_PX, 0, (WIDTH - 1) / 2], [0, FOCAL_PX, (HEIGHT - 1) / 2], [0, 0, 1]])
@@ -143,6 +156,8 @@ def scene(level: str, index: int, seed: int) -> Scene:
 
 def make(level: str, index: int, seed: int) -> Recording:
     """One item; it depends on nothing but the three numbers."""
+    from hecbench.rendering import Renderer
+
     truth = scene(level, index, seed)
     model, mesh = robot_and_mesh()
     rng = np.random.default_rng([seed, zlib.crc32(level.encode()), index, 1])
@@ -182,6 +197,8 @@ def correspondence_floor_mm(level: str, index: int, seed: int) -> float:
     Every visible point of the drawn robot is matched with the same point of the model; the camera minimises the
     reprojection error by Gauss-Newton. What is left cannot be seen in the picture: no method is held to less.
     """
+    from hecbench.rendering import Renderer
+
     truth = scene(level, index, seed)
     model, mesh = robot_and_mesh()
     base_T_link = model.link_poses(truth.joints_rad, frame=BASE)[0]

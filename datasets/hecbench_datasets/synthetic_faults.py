@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from hecbench import se3
 from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
@@ -32,6 +31,8 @@ _FLIPPED_SHARE = 0.3
 
 def arm_recording(robot: RobotModel, rng: np.random.Generator, samples: int = 12) -> Recording:
     """A UR arm that carries a tag before a fixed camera, with joints, stamps, corners and the usual noise."""
+    from scipy.spatial.transform import Rotation
+
     joints_rad = _HOME_RAD + rng.uniform(-1.0, 1.0, (samples, 6)) * _JOINT_SPREAD_RAD
     base_T_flange = robot.forward(joints_rad, base="base", tip="tool0")
     other_T_target = se3.make(Rotation.random(random_state=rng).as_matrix(), [0.0, 0.0, 0.05])
@@ -130,6 +131,8 @@ def small_rotation(recording: Recording, rng: np.random.Generator) -> Recording:
 
 def _replaced_rotations(recording: Recording, rotvecs: Array, rng: np.random.Generator) -> Recording:
     """A new rig with the same camera and target, whose target turns by these rotation vectors (N, 3) rad."""
+    from scipy.spatial.transform import Rotation
+
     X, hand_noise = recording.truth_parent_T_camera, (len(recording), 3)
     assert X is not None
     positions = rng.uniform([-0.2, -0.2, 1.8], [0.2, 0.2, 2.2], hand_noise)
@@ -201,6 +204,8 @@ def _between(first: Array, second: Array, share: float) -> Array:
 
 def mirrored_target_poses(recording: Recording, rng: np.random.Generator) -> Recording:
     """Only target poses, of which some are the mirror image that a planar target allows; needs corners given."""
+    from scipy.spatial.transform import Rotation
+
     assert recording.camera_T_target is not None
     poses = recording.camera_T_target.copy()
     chosen = rng.choice(len(poses), max(1, round(_FLIPPED_SHARE * len(poses))), replace=False)
