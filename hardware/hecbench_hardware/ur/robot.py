@@ -32,7 +32,7 @@ _ARRIVED_RAD = 1e-3
 _BRAKE_S = 0.6
 """Braking from the highest speed, and some."""
 _NEWS_S = 0.2
-"""How long to wait for the supervisor to learn why a program ended."""
+"""How long news may be on its way: why a program ended, or that a motion has arrived."""
 
 
 class UrRobot:
@@ -283,25 +283,28 @@ class UrRobot:
         Raises:
             DeviceFault: The arm does not come to rest, is elsewhere, or the link is lost.
         """
-        moved_s = self._stream.latest.controller_s
+        moved_s, began_s = self._stream.latest.controller_s, time.monotonic()
 
         def still(sample: Sample) -> bool:
             nonlocal moved_s
             if np.abs(sample.joint_speeds).max() >= STILL_RAD_S:
                 moved_s = sample.controller_s
-            return sample.controller_s - moved_s >= STILL_FOR_S
+            news = self._gap_rad(sample) <= _ARRIVED_RAD or time.monotonic() - began_s >= _NEWS_S
+            return news and sample.controller_s - moved_s >= STILL_FOR_S
 
         rests = self._stream.wait_for(still, timeout_s)
         if self._stream.fault:
             raise self._stream.fault
         if not rests:
             raise DeviceFault(Fault.LATE, self.name, f"not still after {timeout_s:.1f} s")
-        state = self.state()
-        if self._target is not None:
-            gap_rad = float(np.abs(state.joints_rad - self._target).max())
-            if gap_rad > _ARRIVED_RAD:
-                raise DeviceFault(Fault.OFF_TARGET, self.name, f"a joint is {gap_rad:.4f} rad off")
-        return state
+        sample = self._stream.latest
+        if (gap_rad := self._gap_rad(sample)) > _ARRIVED_RAD:
+            raise DeviceFault(Fault.OFF_TARGET, self.name, f"a joint is {gap_rad:.4f} rad off")
+        return self._as_state(sample)
+
+    def _gap_rad(self, sample: Sample) -> float:
+        """How far the farthest joint is from the last joint target; 0 without one."""
+        return 0.0 if self._target is None else float(np.abs(sample.joints - self._target).max())
 
     def stop(self) -> None:
         """Brake now, from any thread; by the dashboard when the client does not answer."""
