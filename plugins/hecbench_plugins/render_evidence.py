@@ -17,6 +17,7 @@ from hecbench_plugins.render_views import View
 Array = NDArray[np.float64]
 
 _BLIND = 1e-12
+_PATH_STEPS = 40
 _ROUGHNESS = 1.09
 """Measured error over the Cramer-Rao bound: a sampled picture moves less smoothly than its derivative says."""
 _HALF_TURN = np.diag([-1.0, -1.0, 1.0, 1.0])
@@ -81,7 +82,7 @@ def answer(
     other_side = parent_T_root @ _HALF_TURN @ se3.inverse(parent_T_root)
     diagnostics["path"] = [
         [stage, None if np.isnan(cost) else round(cost, 6), se3.log(se3.inverse(pose)).round(6).tolist()]
-        for stage, pose, cost in trace.poses
+        for stage, pose, cost in _thinned(trace.poses)
     ]
     diagnostics["overlap_from_the_other_side"] = overlap(views[:1], camera_T_parent @ other_side, trace)
     return Estimate(
@@ -93,6 +94,12 @@ def answer(
         diagnostics=diagnostics,
         extras=end.extras,
     )
+
+
+def _thinned(steps: list[tuple[str, Array, float]]) -> list[tuple[str, Array, float]]:
+    """At most `_PATH_STEPS` of the steps, evenly spaced, with the first and the last."""
+    kept = np.linspace(0, len(steps) - 1, min(_PATH_STEPS, len(steps)))
+    return [steps[i] for i in np.round(kept).astype(int)]
 
 
 def _scaled(information: Array, camera_T_parent: Array, views: Sequence[View]) -> tuple[Array, Array]:

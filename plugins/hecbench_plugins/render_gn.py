@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from hecbench import se3
 from hecbench.errors import Refusal, SolverFailure
 from hecbench.estimate import Estimate, Termination
-from hecbench.recording import Recording
+from hecbench.recording import CameraModel, Recording
 from hecbench_plugins import render_evidence as evidence
 from hecbench_plugins import render_stages as stages
 from hecbench_plugins.render_intervals import between_pixels
@@ -72,7 +72,10 @@ class RenderGN:
             )
         if self.unknown:
             end = self._extend(end, kinematics, trace)
-        return evidence.answer(views, end, overlap, trace, _TERMINATIONS[end.descent.ended])
+        found = evidence.answer(views, end, overlap, trace, _TERMINATIONS[end.descent.ended])
+        return (
+            replace(found, camera=_calibrated(recording.camera, found)) if "focal" in found.extras else found
+        )
 
     def _extend(self, end: evidence.End, kinematics: Kinematics, trace: stages.Trace) -> evidence.End:
         """Solve for the other unknowns too, from where the camera alone ended."""
@@ -139,3 +142,12 @@ class RenderGN:
         if violated > self.most_violated:
             return evidence.End("coverage", descent, coverage)
         return evidence.End("intervals", replace(descent, pose=pose), coverage)
+
+
+def _calibrated(camera: CameraModel | None, found: Estimate) -> CameraModel:
+    """The recording's camera with the focal length that was found."""
+    assert camera is not None
+    assert camera.K is not None
+    K = camera.K.copy()
+    K[:2, :2] *= np.exp(found.extras["focal"]["value"])
+    return replace(camera, K=K)

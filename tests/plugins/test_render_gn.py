@@ -38,6 +38,7 @@ def test_converges_from_every_start_level(level, index):
     assert se3.rotation_error_rad(estimate.parent_T_camera, truth) < 3e-4
     assert estimate.termination is Termination.CONVERGED
     assert estimate.renders < 150
+    assert 2 < len(estimate.diagnostics["path"]) <= 40
 
 
 @pytest.mark.parametrize("level", ["gain", "gamma", "blur", "colours", "ragged_mask", "noise"])

@@ -8,8 +8,9 @@ from hecbench_datasets import synthetic
 from hecbench_plugins.render_gn import RenderGN
 from hecbench_plugins.render_unknowns import PRIOR, Unknown
 
-from hecbench import se3
+from hecbench import registry, se3
 from hecbench.recording import CameraModel
+from hecbench.specs import Kind, SolverSpec
 
 
 def solve(recording, *unknown):
@@ -33,6 +34,7 @@ def test_wrong_focal_length_is_found():
     mistaken = replace(recording, camera=CameraModel(640, 480, wrong))
     estimate = solve(mistaken, "focal")
     assert estimate.extras["focal"]["value"] == pytest.approx(-np.log(1.01), abs=2e-4)
+    np.testing.assert_allclose(estimate.camera.K, recording.camera.K, rtol=3e-4)
     assert se3.translation_error_m(estimate.parent_T_camera, recording.truth_parent_T_camera) < 5e-4
 
 
@@ -44,3 +46,9 @@ def test_scale_of_the_robot_is_said_to_be_unobservable():
     distance = np.linalg.norm(estimate.parent_T_camera[:3, 3])
     sigma_m = np.sqrt(np.diag(estimate.covariance)[3:].max())
     assert sigma_m == pytest.approx(PRIOR[Unknown.SCALE] * distance, rel=0.2)
+
+
+@pytest.mark.parametrize("unknown", list(Unknown))
+def test_every_unknown_has_a_solver_by_name(unknown):
+    solver = registry.load().get(Kind.SOLVER, f"render_gn_{unknown}", SolverSpec).factory()
+    assert solver.unknown == (unknown,)
