@@ -187,7 +187,10 @@ def main() -> None:
     elif what == "pictures" and len(sys.argv) == 3:
         from hecbench_hardware.lab import pictures
 
-        pictures.write(Path(sys.argv[2]))
+        station = cells.ur5e()
+        truth = Calibration("07", "truth", 7, station.camera_pose(7))
+        for task in Task:
+            pictures.write(Path(sys.argv[2]), task, truth, station, place=1)
     elif what == "vs060" and len(sys.argv) == 4:
         vs060(sys.argv[2], Path(sys.argv[3]))
     else:

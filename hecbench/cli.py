@@ -90,8 +90,7 @@ def demo(out: Path, samples: int, seed: int) -> None:
     tasks = planning.suite_tasks("markers", levels, samples, (), seed)
     contents = _run(tasks, out, seed, jobs=os.cpu_count() or 1)
     console.print_tables(contents.estimates)
-    path, _ = html.write(out)
-    click.echo(f"report: {path}")
+    click.echo(f"report: {html.write(out).path}")
 
 
 @cli.command()
@@ -214,17 +213,18 @@ def run(
 @click.argument("folder", type=_folder, metavar="DIR")
 @_json
 def report(folder: Path, as_json: bool) -> None:
-    """Write DIR/report.html from the results that a run left in DIR."""
+    """Write DIR/report.html from the results and trials that were left in DIR."""
     from hecbench.report import html
 
-    path, contents = html.write(folder)
-    for sentence in contents.damage:
+    written = html.write(folder)
+    for sentence in written.damage:
         console.say(sentence)
-    summary = {"report": str(path), "results": len(contents.estimates), "damage": contents.damage}
+    counts = {"results": written.results, "trials": written.trials}
     if as_json:
-        console.print_json(summary)
+        console.print_json({"report": str(written.path), **counts, "damage": written.damage})
     else:
-        click.echo(f"{path}: {len(contents.estimates)} results")
+        held = ", ".join(f"{count} {name}" for name, count in counts.items() if count)
+        click.echo(f"{written.path}: {held or 'no trial ended with a verdict'}")
 
 
 @cli.command()

@@ -22,6 +22,8 @@ from hecbench.errors import HecbenchError, InputError
 
 FILE_NAME = "trials.jsonl"
 
+TASKS = ("grasp", "insertion")
+
 Key = tuple[str, str, str, str, int, float, int]
 
 
@@ -119,6 +121,11 @@ def read(folder: Path) -> Contents:
         else:
             trials.setdefault(trial.key, trial)
     return Contents(list(trials.values()), aborted, damage)
+
+
+def picture_name(robot: str, task: str, suffix: str) -> str:
+    """What a picture of one of an arm's trials is called beside the file: png, what the camera saw; gif, a motion."""
+    return f"{robot}_{task}.{suffix}"
 
 
 class Writer:

@@ -15,7 +15,9 @@ from hecbench.errors import InputError
 
 if TYPE_CHECKING:
     from hecbench.trial_record import Contents, TrialRecord
+    from hecbench_hardware.lab.trial_cell import LabCell
     from hecbench_hardware.trials.cell import Calibration, TrialCell
+    from hecbench_hardware.trials.runner import Plan
 
 _folder = click.Path(path_type=Path, file_okay=False)
 _path = click.Path(path_type=Path)
@@ -75,6 +77,7 @@ def insertion(**options: Any) -> None:
 
 
 def _trial(task_name: str, options: dict[str, Any]) -> None:
+    from hecbench_hardware.lab.trial_cell import LabCell
     from hecbench_hardware.trials import runner
     from hecbench_hardware.trials.tasks import Task
 
@@ -105,6 +108,8 @@ def _trial(task_name: str, options: dict[str, Any]) -> None:
             acknowledge=lambda line: _acknowledged(line, options["yes"] or cell.robot.simulated),
             report=_report,
         )
+        if options["render"] and isinstance(cell, LabCell):
+            _draw(plan, cell, out)
     _print(contents, out, options["as_json"])
 
 
@@ -225,6 +230,16 @@ def _provenance(options: dict[str, Any]) -> dict[str, Any]:
     return {"hecbench": __version__, "command": shlex.join(["hecbench", *sys.argv[1:]])} | {
         name: options[name] for name in shown
     }
+
+
+def _draw(plan: Plan, cell: LabCell, out: Path) -> None:
+    """The first trial of a task as pictures, which the report shows."""
+    from hecbench.trial_record import picture_name
+    from hecbench_hardware.lab import pictures
+
+    if cell.camera is not None and not (out / picture_name(cell.name, plan.task, "png")).exists():
+        eye = cell.camera.eye
+        pictures.write(out, plan.task, plan.calibrations[0], cell.station, eye.camera, eye.sensor)
 
 
 def _acknowledged(line: str, at_once: bool) -> bool:

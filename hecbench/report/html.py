@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,32 +21,39 @@ from hecbench.trial_record import TrialRecord
 FILE_NAME = "report.html"
 
 
-def write(folder: Path) -> tuple[Path, store.Contents]:
-    """Read the store in a folder and write ``report.html`` beside it.
+@dataclass(frozen=True)
+class Written:
+    """A page and what it was made of: how many results and trials, and one sentence for each damaged line."""
 
-    Returns:
-        The path of the page, and what the store held.
+    path: Path
+    results: int
+    trials: int
+    damage: list[str]
+
+
+def write(folder: Path) -> Written:
+    """Read the results and trials in a folder and write ``report.html`` beside them.
 
     Raises:
         InputError: the folder holds no store, or no whole result.
     """
-    trials = trial_record.read(folder) if (folder / trial_record.FILE_NAME).is_file() else None
-    alone = trials is not None and not (folder / store.FILE_NAME).is_file()
+    has_trials = (folder / trial_record.FILE_NAME).is_file()
+    trials = trial_record.read(folder) if has_trials else trial_record.Contents([], [], [])
+    alone = has_trials and not (folder / store.FILE_NAME).is_file()
     contents = store.Contents([], []) if alone else store.read(folder)
     if not contents.estimates and not alone:
         raise InputError(f"{folder}: its store holds no whole result; run again with `hecbench run --resume`")
-    path = folder / FILE_NAME
-    files.write_text(
-        path,
-        page(
-            contents.estimates,
-            [*contents.damage, *(trials.damage if trials else [])],
-            f"hecbench report {folder}",
-            lambda sha256: evidence.load(folder, sha256),
-            trials.trials if trials else [],
-        ),
+    damage = [*contents.damage, *trials.damage]
+    text = page(
+        contents.estimates,
+        damage,
+        f"hecbench report {folder}",
+        lambda sha256: evidence.load(folder, sha256),
+        trials.trials,
+        folder,
     )
-    return path, contents
+    files.write_text(folder / FILE_NAME, text)
+    return Written(folder / FILE_NAME, len(contents.estimates), len(trials.trials), damage)
 
 
 def page(
@@ -54,9 +62,10 @@ def page(
     command: str,
     evidence: Callable[[str], Evidence | None],
     trials: Sequence[TrialRecord] = (),
+    folder: Path | None = None,
 ) -> str:
     """The HTML text of a report on these estimates and trials; `evidence` gives what a run kept of a recording, by
-    hash.
+    hash; pictures of trials are in `folder`.
     """
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
@@ -64,12 +73,14 @@ def page(
         loader=PackageLoader("hecbench.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
     sections = [_section(group, evidence) for group in groups(estimates)]
-    sections += sections_of_renderers(estimates) + sections_of_trials(trials)
+    sections += sections_of_renderers(estimates) + sections_of_trials(trials, folder)
     return environment.get_template("report.html.j2").render(
         sections=sections,
         damage=damage,
         command=command,
         runs=len(estimates),
+        trials=len(trials),
+        methods=len({trial.method for trial in trials}),
         recordings=len({e.provenance.get("recording_sha256") for e in estimates}),
         solvers=sorted({e.solver for e in estimates}),
         seeds=_values(estimates, "seed"),

@@ -6,18 +6,20 @@ calibration are not independent: beside Wilson's interval stands the one that re
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Iterable, Sequence
+from html import escape
 from itertools import groupby
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from hecbench import statistics
+from hecbench import files, statistics
 from hecbench.report.svg import COLOURS, panel, svg
 from hecbench.report.tables import Table
-from hecbench.trial_record import Outcome, TrialRecord
+from hecbench.trial_record import TASKS, Outcome, TrialRecord, picture_name
 
-TASKS = ("grasp", "insertion")
 _ABSENT = "-"
 
 PAPER_PCT = {
@@ -53,19 +55,41 @@ def tables(trials: Sequence[TrialRecord]) -> list[Table]:
     return found
 
 
-def sections(trials: Sequence[TrialRecord]) -> list[dict[str, Any]]:
-    """What the HTML page shows of trials, one section for each table; the figures follow the first of an arm."""
+def sections(trials: Sequence[TrialRecord], folder: Path | None = None) -> list[dict[str, Any]]:
+    """What the HTML page shows of trials, one section for each table; the figures follow the first of an arm, and
+    the pictures in the folder the first of its clearances.
+    """
     found: list[dict[str, Any]] = []
-    for _, group in _grouped(trials):
+    shown: set[str] = set()
+    for (robot, _), group in _grouped(trials):
         first, *others = tables(group)
         commands = sorted({str(t.provenance["command"]) for t in group if t.provenance.get("command")})
-        found.append(_section(first, figures(group), commands))
+        drawn = [] if folder is None or robot in shown else pictures(folder, robot)
+        shown.add(robot)
+        found.append(_section(first, figures(group) + drawn, commands))
         found += [_section(other, [], []) for other in others]
     return found
 
 
 def _section(table: Table, drawn: list[str], commands: list[str]) -> dict[str, Any]:
     return {"table": table, "figures": drawn, "commands": commands, "findings": [], "overlays": []}
+
+
+def pictures(folder: Path, robot: str) -> list[str]:
+    """What `hecbench trial` drew of an arm's trials, as HTML that holds the pictures themselves."""
+    found = []
+    for task in TASKS:
+        for suffix, what in (
+            ("png", "what the camera saw, the tag as it was found (red) and where the tool will end (green)"),
+            ("gif", "the motion of one trial in the lab"),
+        ):
+            path = folder / picture_name(robot, task, suffix)
+            if path.is_file():
+                data = b64encode(files.read_bytes(path)).decode()
+                caption = escape(f"{robot}, {task}: {what}")
+                image = f'<img src="data:image/{suffix};base64,{data}" alt="{caption}">'
+                found.append(f"{image}<figcaption>{caption}</figcaption>")
+    return found
 
 
 def figures(trials: Sequence[TrialRecord]) -> list[str]:

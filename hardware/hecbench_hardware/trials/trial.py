@@ -15,7 +15,8 @@ from hecbench.errors import InputError
 from hecbench.se3 import Array
 from hecbench.trial_record import Outcome, TrialRecord
 from hecbench_hardware.devices import DeviceFault, Fault
-from hecbench_hardware.trials import tasks
+from hecbench_hardware.kinematics import UrArm
+from hecbench_hardware.trials import solids, tasks
 from hecbench_hardware.trials.cell import Calibration, NotSeen, Stroke, TrialCell, believed_workpiece
 from hecbench_hardware.trials.tasks import Task
 
@@ -108,7 +109,7 @@ class Trial:
             end = workpiece @ tasks.workpiece_T_tool(self.task)
             self._compare_with_truth(record, end, camera_T_tag)
         with self._in(State.APPROACH):
-            joints, end = self._reach(end)
+            joints, end = reach(robot.arm, cell.home_rad, cell.shape, self.task, end)
             start = tasks.above(end, tasks.stroke_m(self.task))
             if self.task is Task.GRASP:
                 cell.gripper.open_fingers()
@@ -168,22 +169,6 @@ class Trial:
     def _flange(self, base_T_tool: Array) -> Array:
         return np.asarray(base_T_tool @ se3.inverse(self.cell.shape.flange_T_tool))
 
-    def _reach(self, end: Array) -> tuple[Array, Array]:
-        """Joints (6,) rad at the start of the stroke, and the end pose turned the way that is nearest to home."""
-        found = []
-        for turned in (end, end @ tasks.HALF_TURN):
-            start = self._flange(tasks.above(turned, tasks.stroke_m(self.task)))
-            for joints in self.cell.robot.arm.inverse(start, self.cell.home_rad)[:1]:
-                found.append((float(np.abs(joints - self.cell.home_rad).max()), joints, turned))
-        if not found:
-            x, y, z = end[:3, 3]
-            raise OutOfReach(
-                f"the {self.task} at {x:.3f}, {y:.3f}, {z:.3f} m of the base is out of reach:"
-                " check the calibration, or put the workpiece nearer"
-            )
-        _, joints, turned = min(found, key=lambda item: item[0])
-        return joints, turned
-
     def _compare_with_truth(self, record: TrialRecord, end: Array, camera_T_tag: Array) -> None:
         if (truth := self.cell.truth()) is not None:
             true_end = truth[0] @ tasks.workpiece_T_tool(self.task)
@@ -203,3 +188,24 @@ class Trial:
         except (DeviceFault, InputError) as error:
             return error if isinstance(error, DeviceFault) else fault
         return None
+
+
+def reach(arm: UrArm, home_rad: Array, shape: solids.Gripper, task: Task, end: Array) -> tuple[Array, Array]:
+    """Joints (6,) rad at the start of the stroke to `end`, and the end pose turned the way that is nearest to home.
+
+    Raises:
+        OutOfReach: The arm cannot go there.
+    """
+    found = []
+    for turned in (end, end @ tasks.HALF_TURN):
+        start = tasks.above(turned, tasks.stroke_m(task)) @ se3.inverse(shape.flange_T_tool)
+        for joints in arm.inverse(start, home_rad)[:1]:
+            found.append((float(np.abs(joints - home_rad).max()), joints, turned))
+    if not found:
+        x, y, z = end[:3, 3]
+        raise OutOfReach(
+            f"the {task} at {x:.3f}, {y:.3f}, {z:.3f} m of the base is out of reach:"
+            " check the calibration, or put the workpiece nearer"
+        )
+    _, joints, turned = min(found, key=lambda item: item[0])
+    return joints, turned

@@ -1,6 +1,8 @@
 """The verb: tables and JSON, estimates checked against the cell, the real driver, one line for bad input."""
 
 import json
+import re
+from base64 import b64encode
 from dataclasses import replace
 
 import numpy as np
@@ -10,9 +12,11 @@ from hecbench_hardware.lab import cells
 from hecbench_hardware.trial_commands import trial
 
 from hecbench import se3, trial_record
+from hecbench.cli import cli
 from hecbench.errors import InputError
 from hecbench.estimate import Estimate, Status
 from hecbench.recording import CameraModel, Mounting
+from hecbench.report import html
 from hecbench.report import trials as report
 
 pytest.importorskip("mujoco", reason="the contact sweep needs mujoco: pip install 'hecbench[lab]'")
@@ -128,3 +132,16 @@ def test_trial_with_pictures(tmp_path):
     (found,) = trial_record.read(tmp_path).trials
     assert found.outcome == "success"
     assert 0 < found.tag_error_mm < 5
+    grasp = (tmp_path / "ur5e_grasp.png").read_bytes(), (tmp_path / "ur5e_grasp.gif").read_bytes()
+    assert [picture[:4] for picture in grasp] == [b"\x89PNG", b"GIF8"]
+    text = html.write(tmp_path).path.read_text()
+    assert [b64encode(picture).decode() in text for picture in grasp] == [True, True]
+    assert not re.findall(r'(?:src|href)="(?!data:|#)', text)
+
+
+def test_report_of_trials_alone_counts_them(tmp_path):
+    assert run("grasp", "--offset-mm", 0, "--no-render", "--trials", 2, "--out", tmp_path).exit_code == 0
+    assert CliRunner().invoke(cli, ["report", str(tmp_path)]).output.strip().endswith("report.html: 2 trials")
+    printed = json.loads(CliRunner().invoke(cli, ["report", str(tmp_path), "--json"]).stdout)
+    assert (printed["results"], printed["trials"], printed["damage"]) == (0, 2, [])
+    assert "2 trials of 1 calibration method." in html.write(tmp_path).path.read_text()

@@ -152,7 +152,7 @@ def written(tmp_path_factory):
     tasks = [Task(names, path=out / "cell")]
     tasks += [Task(names, suite="markers", level="board_2m", index=i) for i in range(3)]
     runner.run(tasks, Options(command="hecbench run markers"), out=out)
-    return html.write(out)[0]
+    return html.write(out).path
 
 
 def test_page_is_self_contained_and_complete(written):
@@ -173,7 +173,7 @@ def test_page_is_self_contained_and_complete(written):
 
 def test_same_results_give_the_same_page(written):
     before = written.read_bytes()
-    assert html.write(written.parent)[0].read_bytes() == before
+    assert html.write(written.parent).path.read_bytes() == before
 
 
 def test_page_in_a_browser(written, tmp_path):
