@@ -1,8 +1,9 @@
-"""The hooks a plugin may implement. Each yields specs of `hecbench.specs`; importing a plugin stays cheap."""
+"""The hooks a plugin may implement. All but the last yield specs of `hecbench.specs`; importing one stays cheap."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 
 import pluggy
 
@@ -17,6 +18,9 @@ from hecbench.specs import (
     SuiteSpec,
     TranslatorSpec,
 )
+
+if TYPE_CHECKING:
+    from hecbench.trial_record import TrialRecord
 
 GROUP = "hecbench"
 """The entry-point group and the prefix of every hook."""
@@ -87,4 +91,10 @@ def hecbench_grippers() -> Iterable[DeviceSpec]:
 @hookspec
 def hecbench_cameras() -> Iterable[DeviceSpec]:
     """Cameras, simulated and real."""
+    raise NotImplementedError
+
+
+@hookspec
+def hecbench_trial_finished(trial: TrialRecord) -> None:
+    """Called after each trial, an aborted one too, once it is on disk; what it raises does not end the run."""
     raise NotImplementedError

@@ -7,8 +7,8 @@ modules with hooks. Every module is imported inside its own ``try``, so one bad 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cache
 from importlib import import_module, metadata
@@ -23,6 +23,9 @@ from hecbench.errors import InputError
 from hecbench.specs import AnySpec, Kind, SolverSpec, Spec
 
 hookimpl = pluggy.HookimplMarker(hookspecs.GROUP)
+
+TrialObserver = Callable[..., object]
+"""Called as `observer(trial=TrialRecord)`."""
 
 AnySpecT = TypeVar("AnySpecT", bound=Spec)
 
@@ -64,9 +67,10 @@ class Plugin:
 
 @dataclass(frozen=True)
 class Registry:
-    """All plugins, found once, sorted by kind and name."""
+    """All plugins, found once, sorted by kind and name; functions to call after each trial, by their module."""
 
     plugins: list[Plugin]
+    trial_observers: dict[str, TrialObserver] = field(default_factory=dict)
 
     def select(self, kind: Kind | None = None) -> list[Plugin]:
         """Plugins of one kind or, with the unloadable ones, of all."""
@@ -97,15 +101,17 @@ def load() -> Registry:
 
 def build(entry_points: Iterable[metadata.EntryPoint]) -> Registry:
     """Load the given entry points one by one and collect their specs."""
+    observers: dict[str, TrialObserver] = {}
     plugins = [
         plugin
         for entry_point in sorted(entry_points, key=lambda e: (e.name, e.value))
-        for plugin in _plugins_of(entry_point)
+        for plugin in _plugins_of(entry_point, observers)
     ]
-    return Registry(sorted(_refuse_shared_names(plugins), key=lambda p: (p.kind or "", p.name)))
+    listed = sorted(_refuse_shared_names(plugins), key=lambda p: (p.kind or "", p.name))
+    return Registry(listed, observers)
 
 
-def _plugins_of(entry_point: metadata.EntryPoint) -> Iterator[Plugin]:
+def _plugins_of(entry_point: metadata.EntryPoint, observers: dict[str, TrialObserver]) -> Iterator[Plugin]:
     distribution = entry_point.dist.name if entry_point.dist else "unknown"
     version = entry_point.dist.version if entry_point.dist else "unknown"
 
@@ -120,26 +126,32 @@ def _plugins_of(entry_point: metadata.EntryPoint) -> Iterator[Plugin]:
         return
     for module_name in getattr(target, "plugin_modules", (target.__name__,)):
         try:
-            specs = _specs(import_module(module_name))
+            specs, observer = _implemented(import_module(module_name))
         except Exception as error:  # likewise
             yield broken(module_name, error)
             continue
+        if observer is not None:
+            observers[module_name] = observer
         for spec in specs:
             status, detail = _readiness(spec)
             yield Plugin(spec.name, spec.kind, status, distribution, version, detail, spec)
 
 
-def _specs(module: ModuleType) -> list[AnySpec]:
-    """Everything that the hooks of one module yield; a misspelt hook raises instead of being ignored."""
+def _implemented(module: ModuleType) -> tuple[list[AnySpec], TrialObserver | None]:
+    """Everything that the hooks of one module yield, and its observer of trials; a misspelt hook raises instead of
+    being ignored.
+    """
     manager = pluggy.PluginManager(hookspecs.GROUP)
     manager.add_hookspecs(hookspecs)
     manager.register(module)
     manager.check_pending()
-    specs = [spec for hook in manager.get_hookcallers(module) or [] for yielded in hook() for spec in yielded]
+    hooks = {hook.name: hook for hook in manager.get_hookcallers(module) or []}
+    observer = hooks.pop(hookspecs.hecbench_trial_finished.__name__, None)
+    specs = [spec for hook in hooks.values() for yielded in hook() for spec in yielded]
     for spec in specs:
         if not isinstance(spec, Spec):
             raise TypeError(f"a hook yielded {spec!r}, expected a spec of hecbench.specs")
-    return specs
+    return specs, observer
 
 
 def _readiness(spec: Spec) -> tuple[PluginStatus, str]:

@@ -107,6 +107,7 @@ def _trial(task_name: str, options: dict[str, Any]) -> None:
             resume=options["resume"],
             acknowledge=lambda line: _acknowledged(line, options["yes"] or cell.robot.simulated),
             report=_report,
+            warn=lambda line: click.echo(line, err=True),
         )
         if options["render"] and isinstance(cell, LabCell):
             _draw(plan, cell, out)

@@ -80,7 +80,10 @@ def pictures(folder: Path, robot: str) -> list[str]:
     found = []
     for task in TASKS:
         for suffix, what in (
-            ("png", "what the camera saw, the tag as it was found (red) and where the tool will end (green)"),
+            (
+                "png",
+                "what the camera saw, the tag as it was found (red) and where the tool is to end (green)",
+            ),
             ("gif", "the motion of one trial in the lab"),
         ):
             path = folder / picture_name(robot, task, suffix)

@@ -20,6 +20,16 @@ def hecbench_solvers():
                      imports={imports}, reference="r")
 """
 
+OBSERVER = """
+from hecbench.registry import hookimpl
+
+seen = []
+
+@hookimpl
+def hecbench_trial_finished({argument}):
+    seen.append({argument})
+"""
+
 
 @pytest.fixture
 def entry_point(tmp_path, monkeypatch):
@@ -90,3 +100,16 @@ def test_two_claims_on_one_name_are_refused(entry_point):
 def test_unknown_names_are_answered_with_the_known_ones():
     with pytest.raises(InputError, match=r"no solver is called 'tasi': choose one of .*tsai"):
         registry.load().get(Kind.SOLVER, "tasi", SolverSpec)
+
+
+def test_an_observer_of_trials_is_found_and_not_listed(entry_point):
+    found = registry.build([entry_point("third_observer", OBSERVER.format(argument="trial"))])
+    assert found.plugins == []
+    found.trial_observers["third_observer"](trial="a trial")
+    assert sys.modules["third_observer"].seen == ["a trial"]
+
+
+def test_a_misspelt_argument_of_an_observer_is_broken(entry_point):
+    found = registry.build([entry_point("third_misspelt", OBSERVER.format(argument="trail"))])
+    assert [plugin.status for plugin in found.plugins] == ["broken"]
+    assert found.trial_observers == {}

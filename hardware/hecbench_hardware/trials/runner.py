@@ -7,8 +7,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from hecbench import trial_record
+from hecbench import registry, trial_record
 from hecbench.errors import InputError
+from hecbench.registry import TrialObserver
 from hecbench.trial_record import Contents, Outcome, TrialRecord
 from hecbench_hardware.devices import DeviceFault
 from hecbench_hardware.trials import solids
@@ -59,8 +60,11 @@ def run(
     resume: bool = False,
     acknowledge: Callable[[str], bool] = lambda line: False,
     report: Callable[[TrialRecord], object] = lambda trial: None,
+    warn: Callable[[str], object] = lambda line: None,
 ) -> Contents:
     """Carry out what is not there yet; a trial is on disk before the next one begins.
+
+    Each trial goes to `report` and to the plugins that observe trials; `warn` hears of those that fail.
 
     Raises:
         InputError: The folder holds other trials, or is in use.
@@ -68,13 +72,30 @@ def run(
     """
     if not plan.calibrations:
         raise InputError("there is no calibration to try: give --estimate or --offset-mm")
+    observers = dict(registry.load().trial_observers)
+
+    def tell(trial: TrialRecord) -> None:
+        report(trial)
+        _observe(trial, observers, warn)
+
     with trial_record.writing(out, resume=resume) as writer:
         done = {trial.key for trial in trial_record.read(out).trials}
         for calibration, place in plan.pairs(cell.places):
             trial = Trial(cell, plan.task, calibration, place, plan.clearance_m, plan.seed, acknowledge)
             if _key(trial) not in done:
-                _until_decided(trial, writer, plan.provenance, report)
+                _until_decided(trial, writer, plan.provenance, tell)
     return trial_record.read(out)
+
+
+def _observe(trial: TrialRecord, observers: dict[str, TrialObserver], warn: Callable[[str], object]) -> None:
+    """Call every observer; one that fails is named, once, and not called again."""
+    for name, observer in list(observers.items()):
+        try:
+            observer(trial=trial)
+        except Exception as error:  # a stranger's function may raise anything
+            del observers[name]
+            what = f"{type(error).__name__}: {error}".splitlines()[0]
+            warn(f"{name}: its hecbench_trial_finished failed ({what}) and is not called again")
 
 
 def _key(trial: Trial) -> trial_record.Key:

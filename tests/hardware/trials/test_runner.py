@@ -16,7 +16,7 @@ from hecbench_hardware.trials.cell import Calibration, NotSeen
 from hecbench_hardware.trials.runner import Plan
 from hecbench_hardware.trials.tasks import Task
 
-from hecbench import se3, trial_record
+from hecbench import registry, se3, trial_record
 from hecbench.errors import InputError
 from hecbench.trial_record import Outcome
 
@@ -196,3 +196,19 @@ def test_two_runs_cannot_write_to_one_folder(cell, moved, tmp_path):
         pytest.raises(InputError, match="other trials are written here"),
     ):
         runner.run(Plan(Task.GRASP, moved(0.0)), cell, tmp_path, resume=True)
+
+
+def test_observers_hear_of_every_trial_and_a_broken_one_is_named_once(cell, moved, tmp_path, monkeypatch):
+    seen, warnings = [], []
+
+    def broken(trial):
+        raise RuntimeError("no printer\nat all")
+
+    observers = {"broken": broken, "good": lambda trial: seen.append(trial.key)}
+    monkeypatch.setattr(registry, "load", lambda: registry.Registry([], observers))
+    contents = runner.run(Plan(Task.GRASP, moved(0.0, 1)), cell, tmp_path, warn=warnings.append)
+    assert seen == [trial.key for trial in contents.trials]
+    assert len(seen) == 3
+    assert warnings == [
+        "broken: its hecbench_trial_finished failed (RuntimeError: no printer) and is not called again"
+    ]
