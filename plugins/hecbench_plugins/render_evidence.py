@@ -18,6 +18,7 @@ Array = NDArray[np.float64]
 
 _BLIND = 1e-12
 _PATH_STEPS = 40
+_NEAR_PX = 2.0
 _ROUGHNESS = 1.09
 """Measured error over the Cramer-Rao bound: a sampled picture moves less smoothly than its derivative says."""
 _HALF_TURN = np.diag([-1.0, -1.0, 1.0, 1.0])
@@ -37,13 +38,23 @@ class End:
 
 
 def overlap(views: Sequence[View], pose: Array, trace: stages.Trace) -> float:
-    """The least intersection over union of drawing and mask among the views, at half size."""
+    """The least intersection over union of drawing and mask among the views, at half size, where seen."""
     values = []
     for view in views:
         at = stages.draw(view, 2, pose, trace)
-        drawn, seen = at.renderer.face >= 0, at.observed[..., 3] > 0.5
+        drawn, seen = at.drawn(), at.observed[..., 3] > 0.5
         values.append(float((drawn & seen).sum() / max((drawn | seen).sum(), 1)))
     return min(values)
+
+
+def contour_found(views: Sequence[View], pose: Array, trace: stages.Trace) -> float:
+    """The least share among the views of the drawn contour within `_NEAR_PX` of the mask's, at full size."""
+    shares = []
+    for view, distance in zip(views, stages.distances_at(views, 1), strict=True):
+        at = stages.draw(view, 1, pose, trace)
+        off, _ = stages.contour_rows(at.renderer.crossings, stages.outer(at), distance)
+        shares.append(float((np.abs(off) < _NEAR_PX).sum() / max(len(off), 1)))
+    return min(shares)
 
 
 def answer(

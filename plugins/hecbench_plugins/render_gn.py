@@ -38,11 +38,16 @@ _RESTART_TURNS_DEG = ((0, 0, 0), (0, 0, 25), (0, 0, -25), (0, 20, 0), (0, -20, 0
 class RenderGN:
     """The options of the method.
 
+    An answer is believed when drawing and mask overlap by `sure_overlap`. Where less overlaps, either something hides
+    part of the robot or the pose is wrong. What hides a part cuts pieces off the mask and leaves the rest of its
+    contour in place, a wrong pose draws its contour elsewhere: besides `least_overlap`, a share `least_contour` of
+    the drawn contour must then lie within 2 px of the mask's, or the run is a failure.
+
     Attributes:
         unknown: solved for besides the camera, each with a prior: joint offsets, scale of the robot, focal length.
         huber: residual in [0, 1] from which on a pixel's colour counts less.
         good_overlap: intersection over union of mask and drawing below which other starts are tried.
-        least_overlap: the same below which the run is called a failure.
+        sure_overlap, least_overlap, least_contour: see above.
         most_violated: share of the contour beside the mask's changes above which the mask is not one of sampled
             pixels and the coverage alone decides.
     """
@@ -50,7 +55,9 @@ class RenderGN:
     unknown: tuple[Unknown, ...] = ()
     huber: float = 0.3
     good_overlap: float = 0.9
+    sure_overlap: float = 0.8
     least_overlap: float = 0.6
+    least_contour: float = 2 / 3
     most_violated: float = 0.25
 
     def __call__(self, recording: Recording, *, rng: np.random.Generator) -> Estimate:
@@ -65,11 +72,7 @@ class RenderGN:
         coarse = self._align(views, start, trace)
         end = self._refine(views, coarse, trace)
         overlap = evidence.overlap(views, end.descent.pose, trace)
-        if overlap < self.least_overlap:
-            raise SolverFailure(
-                f"ended where drawing and mask overlap by {overlap:.2f} only: the start is too far off or the"
-                " masks show another robot"
-            )
+        self._believe(views, end, overlap, trace)
         if self.unknown:
             end = self._extend(end, kinematics, trace)
         found = evidence.answer(views, end, overlap, trace, _TERMINATIONS[end.descent.ended])
@@ -93,6 +96,17 @@ class RenderGN:
         )
         solved = solve(wider, end.descent.pose, last.noise())
         return evidence.End(end.kind, solved.descent, wider, solved.extras, solved.covariance)
+
+    def _believe(self, views: list[View], end: evidence.End, overlap: float, trace: stages.Trace) -> None:
+        """Raises SolverFailure when the mask contradicts the end; see the class."""
+        if overlap >= self.sure_overlap:
+            return
+        found = evidence.contour_found(views, end.descent.pose, trace)
+        if overlap < self.least_overlap or found < self.least_contour:
+            raise SolverFailure(
+                f"ended where drawing and mask overlap by {overlap:.2f} only and share {100 * found:.0f} % of the"
+                " contour: the start is too far off, or the masks show another robot or too little of it"
+            )
 
     def _camera_inside(self, view: View, pose: Array, trace: stages.Trace) -> bool:
         renderer = stages.draw(view, 4, pose, trace).renderer

@@ -56,6 +56,7 @@ def _violations(at: Level) -> tuple[Array, Array]:
     y, x = p // width, p % width
     reach = _MASK_REACH_PX + 1
     inside = (x >= reach) & (x < width - reach - 1) & (y >= reach) & (y < height - reach - 1)
+    inside &= ~at.unseen(crossings.pixels)
     chosen = np.flatnonzero(inside & (crossings.parts < 0).any(1) & (np.abs(crossings.slope) <= 1))
     steps = np.arange(-_MASK_REACH_PX, _MASK_REACH_PX + 1)
     stride = crossings.pixels[chosen, 1] - p[chosen]

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,7 +64,7 @@ def centroid_and_area(views: Sequence[View], start: Array, trace: Trace, rounds:
             if not len(rows):
                 continue
             aim = np.array([(columns.mean() - K[0, 2]) / K[0, 0], (rows.mean() - K[1, 2]) / K[1, 1], 1.0])
-            drawn = at.renderer.face >= 0
+            drawn = at.drawn()
             if drawn.sum() < 20:
                 centre = (pose @ view.parent_T_link)[:, :3, 3].mean(0)
                 moves.append(aim * max(float(centre[2]), 0.5) - centre)
@@ -92,9 +93,7 @@ def silhouette_step(
         A, b, cost, count = np.zeros((6, 6)), np.zeros(6), 0.0, 0
         for view, distance in zip(views, distances, strict=True):
             at = draw(view, level, pose, trace)
-            crossings = at.renderer.crossings
-            outer = np.asarray((crossings.parts < 0).any(1))
-            residual, jacobian = contour_rows(crossings, outer, distance)
+            residual, jacobian = contour_rows(at.renderer.crossings, outer(at), distance)
             cost += kernels.row_weights(jacobian, residual, clip, A, b)
             count += len(residual)
         if count < _FEWEST_CROSSINGS:
@@ -102,6 +101,12 @@ def silhouette_step(
         return cost / count, A, b
 
     return step
+
+
+def outer(at: Level) -> NDArray[np.bool_]:
+    """Which crossings (C,) lie on the drawn contour, where it can be seen."""
+    crossings = at.renderer.crossings
+    return np.asarray((crossings.parts < 0).any(1)) & ~at.unseen(crossings.pixels)
 
 
 def contour_rows(
@@ -117,7 +122,8 @@ def contour_rows(
 
 def distances_at(views: Sequence[View], level: int) -> list[NDArray[np.float32]]:
     """The signed distance fields of the masks."""
-    return [signed_distance(view.levels[level].observed[..., 3]) for view in views]
+    at_level = [view.levels[level] for view in views]
+    return [signed_distance(at.observed[..., 3], at.hidden) for at in at_level]
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,6 +169,8 @@ class Photometry:
         nominal = at.renderer.mesh.colours
         known = self.fitted[index]
         part, box = at.renderer.part, at.renderer.box
+        if at.hidden is not None:
+            part = np.where(at.hidden, np.int32(-1), part)
         sums, counts = np.zeros_like(nominal), np.zeros_like(nominal)
         margin = 1 + int(np.ceil(2 * self.blur_px))
         for _ in range(3 if known is None else 1):
@@ -211,14 +219,16 @@ class Photometry:
             blurred = image.copy()
             blurred[area] = ndimage.gaussian_filter(image[area], sigma, mode="nearest")
             image = blurred
+            self._hide(at, image)
             kernels.huber_slope(image[area], observed[area], self.huber, slope[area])
             slope[area] = ndimage.gaussian_filter(slope[area], sigma, mode="constant")
         else:
+            self._hide(at, image)
             area = (slice(box[2], box[3] + 1), slice(box[0], box[1] + 1))
             kernels.huber_slope(image[area], observed[area], self.huber, slope[area])
         self.residuals[index] = (image - observed)[area]
         crossings = renderer.crossings
-        change = (table[crossings.parts[:, 0]] - table[crossings.parts[:, 1]])[:, self.channels]
+        change = _change(at, table)[:, self.channels]
         kernels.normal_equations(
             crossings.pixels,
             crossings.mix[:, 1::2],
@@ -248,7 +258,7 @@ class Photometry:
                 continue
             crossings = view.levels[self.level].renderer.crossings
             table = np.vstack([fitted.table, view.levels[self.level].background[:3]]).astype(float)
-            change = table[crossings.parts[:, 0]] - table[crossings.parts[:, 1]]
+            change = _change(view.levels[self.level], table)
             pixels, slot = np.unique(crossings.pixels, return_inverse=True)
             slot = slot.reshape(crossings.pixels.shape)
             rows = np.zeros((len(pixels), 3, 6))
@@ -277,6 +287,11 @@ class Photometry:
         r = float(np.clip(beside / max(squares, 1e-30), 0, 0.9))
         return float(np.sqrt(squares / max(count - 6, 1)) * (1 + r) / (1 - r))
 
+    def _hide(self, at: Level, image: NDArray[np.float32]) -> None:
+        """Where something may hide the robot the drawn picture is background, as the observed one is there."""
+        if at.hidden is not None:
+            image[at.hidden] = at.background[self.channels]
+
     def _grown(self, box: NDArray[np.int32], shape: tuple[int, ...]) -> NDArray[np.int32]:
         by = int(np.ceil(4 * self.blur_px))
         left, right, top, bottom = box
@@ -289,6 +304,14 @@ class Photometry:
             ],
             np.int32,
         )
+
+
+def _change(at: Level, table: NDArray[Any]) -> NDArray[Any]:
+    """Colour of p minus colour of q of every crossing, 0 where it cannot be seen."""
+    crossings = at.renderer.crossings
+    change = table[crossings.parts[:, 0]] - table[crossings.parts[:, 1]]
+    change[at.unseen(crossings.pixels)] = 0
+    return np.asarray(change)
 
 
 def tone_exponent(photometry: Photometry) -> float:

@@ -23,6 +23,7 @@ LEVELS = (4, 2, 1)
 _COARSE_CELL_M = {4: 0.004, 2: 0.0015, 1: 0.0}
 _LEAST_MASK, _MOST_MASK = 1e-3, 0.95
 _BACKGROUND_SPREAD = 0.08
+_SMALLEST_HIDING_PX, _SOFT_EDGE_PX = 9, 2
 
 
 @lru_cache(maxsize=4)
@@ -41,6 +42,19 @@ class Level:
     """(h, w, 4): RGB, 0 outside the mask when `masked`, and the mask, all in [0, 1]."""
     background: NDArray[np.float32]
     """(4,), the last 0."""
+    hidden: NDArray[np.bool_] | None
+    """(h, w) where something else may stand before the robot, observed as background; None: nowhere."""
+
+    def unseen(self, pixels: NDArray[np.int32]) -> NDArray[np.bool_]:
+        """Which crossings (C,), of flat pixels (C, 2), touch what is hidden."""
+        if self.hidden is None:
+            return np.zeros(len(pixels), bool)
+        return np.asarray(self.hidden.reshape(-1)[pixels].any(1))
+
+    def drawn(self) -> NDArray[np.bool_]:
+        """Where (h, w) the robot was drawn last and can be seen."""
+        drawn = self.renderer.face >= 0
+        return drawn if self.hidden is None else drawn & ~self.hidden
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,6 +150,11 @@ def _view(
     cut[..., 3] = mask
     if raw is not None:
         cut[..., :3] = raw if uniform else raw * mask[..., None]
+    hidden = None
+    if raw is not None and uniform and has_mask:
+        hidden = hidden_by_others(raw, background, mask)
+        if hidden is not None:
+            cut[hidden] = np.append(background, 0)
     reference = np.append(background if uniform else np.zeros(3), 0).astype(np.float32)
     levels = {
         level: Level(
@@ -147,6 +166,7 @@ def _view(
             ),
             shrink(cut, level),
             reference,
+            None if hidden is None else shrink(hidden[..., None].astype(np.float32), level)[..., 0] > 0,
         )
         for level in LEVELS
     }
@@ -204,6 +224,23 @@ def foreground(image: Picture, where: str) -> Picture:
     return np.asarray(mask, np.float32)
 
 
+def hidden_by_others(
+    image: Picture, background: NDArray[np.float32], mask: Picture
+) -> NDArray[np.bool_] | None:
+    """Where (H, W) something neither robot, by the mask, nor background, by the picture, may hide the robot.
+
+    Such places say nothing about the robot. What is thinner than `_SMALLEST_HIDING_PX` is a ragged edge of the mask.
+    """
+    import cv2
+
+    off = np.abs(cv2.blur(image, (5, 5)) - background).max(-1) > _BACKGROUND_SPREAD
+    other = (off & (mask < 0.5)).astype(np.uint8)
+    thick = cv2.morphologyEx(other, cv2.MORPH_OPEN, np.ones((_SMALLEST_HIDING_PX,) * 2, np.uint8))
+    if not thick.any():
+        return None
+    return np.asarray(cv2.dilate(thick, np.ones((2 * _SOFT_EDGE_PX + 1,) * 2, np.uint8)) > 0)
+
+
 def _far_from(mask: Picture) -> NDArray[np.bool_]:
     from scipy import ndimage
 
@@ -214,11 +251,15 @@ def _far_from(mask: Picture) -> NDArray[np.bool_]:
     return far
 
 
-def signed_distance(mask: Picture) -> NDArray[np.float32]:
-    """Distance (h, w) px of pixel centres from the contour of `mask` > 0.5, negative inside."""
+def signed_distance(mask: Picture, hidden: NDArray[np.bool_] | None = None) -> NDArray[np.float32]:
+    """Distance (h, w) px of pixel centres from the contour of `mask` > 0.5, negative inside.
+
+    Where the mask ends at something hidden it has no contour.
+    """
     import cv2
 
     inside = (mask > 0.5).astype(np.uint8)
     outward = cv2.distanceTransform(1 - inside, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    inward = cv2.distanceTransform(inside, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
+    solid = inside if hidden is None else inside | hidden.astype(np.uint8)
+    inward = cv2.distanceTransform(solid, cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     return np.asarray(np.where(inside > 0, 0.5 - inward, outward - 0.5), np.float32)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hecbench_datasets import synthetic
 from hecbench_plugins.render_gn import RenderGN
+from hecbench_plugins.render_views import prepare
 
 from hecbench import se3
 from hecbench.errors import Refusal, SolverFailure
@@ -41,10 +42,30 @@ def test_converges_from_every_start_level(level, index):
     assert 2 < len(estimate.diagnostics["path"]) <= 40
 
 
-@pytest.mark.parametrize("level", ["gain", "gamma", "blur", "colours", "ragged_mask", "noise"])
+@pytest.mark.parametrize("level", ["gain", "gamma", "blur", "colours", "ragged_mask", "noise", "occlusion"])
 def test_appearance_does_not_move_the_answer(level):
     recording = synthetic.make(level, 1, 0)
     assert camera_T_parent_error_mm(solve(recording), recording) < 0.3
+
+
+def test_only_what_is_thick_beside_the_mask_counts_as_hiding():
+    for level, hides in (("LP", False), ("ragged_mask", False), ("noise", False), ("occlusion", True)):
+        for index in range(2):
+            _, (view,) = prepare(synthetic.make(level, index, 3))
+            assert (view.levels[1].hidden is not None) == hides, level
+
+
+@pytest.mark.parametrize("index", [0, 9])
+def test_a_fifth_hidden_is_found_by_masks_alone(index):
+    recording = replace(synthetic.make("occlusion", index, 1), images=None)
+    assert camera_T_parent_error_mm(solve(recording), recording) < 5
+
+
+@pytest.mark.parametrize("index", [8, 37])
+def test_an_end_that_the_contour_contradicts_is_a_failure(index):
+    recording = replace(synthetic.make("occlusion", index, 1), images=None)
+    with pytest.raises(SolverFailure, match="of the contour"):
+        solve(recording)
 
 
 def test_wrong_geometry_costs_no_more_than_it_must():
