@@ -1,15 +1,11 @@
 """What a trial leaves: the schema ``hecbench.trial/1`` and its append-only file ``trials.jsonl``.
 
-A line is written by one call and flushed to disk, so that a program that is killed loses at most the trial in
-progress; reading skips what is damaged and counts what was written twice once.
+Reading skips what is damaged and counts what was written twice once.
 """
 
 from __future__ import annotations
 
-import fcntl
-import os
-from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -17,8 +13,8 @@ from typing import Any, Literal
 
 import msgspec
 
-from hecbench import files
-from hecbench.errors import HecbenchError, InputError
+from hecbench import journal
+from hecbench.errors import InputError
 
 FILE_NAME = "trials.jsonl"
 
@@ -108,9 +104,7 @@ def read(folder: Path) -> Contents:
     trials: dict[Key, TrialRecord] = {}
     aborted, damage = [], []
     decoder = msgspec.json.Decoder(TrialRecord)
-    for number, line in enumerate(files.read_bytes(path).split(b"\n"), start=1):
-        if not line.strip():
-            continue
+    for number, line in journal.lines(path):
         try:
             trial = decoder.decode(line)
         except (msgspec.MsgspecError, UnicodeDecodeError):
@@ -128,46 +122,17 @@ def picture_name(robot: str, task: str, suffix: str) -> str:
     return f"{robot}_{task}.{suffix}"
 
 
-class Writer:
-    """Appends to a file that this process alone has open."""
-
-    def __init__(self, descriptor: int) -> None:
-        self._descriptor = descriptor
-
-    def append(self, trial: TrialRecord) -> None:
-        """Write one trial as one line and wait until it is on disk."""
-        line = msgspec.json.encode(trial) + b"\n"
-        if os.write(self._descriptor, line) != len(line):
-            raise HecbenchError("the trials could not be written completely: is the disk full?")
-        os.fsync(self._descriptor)
-
-
-@contextmanager
-def writing(folder: Path, *, resume: bool) -> Iterator[Writer]:
+def writing(folder: Path, *, resume: bool) -> AbstractContextManager[journal.Writer[TrialRecord]]:
     """Open the file of a folder for appending.
 
     Raises:
         InputError: it holds trials and `resume` is False, or another process writes to it.
         HecbenchError: the folder cannot be written.
     """
-    path = folder / FILE_NAME
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        descriptor = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o666)
-    except OSError as error:
-        raise HecbenchError(f"{path}: cannot be written ({error.strerror}); choose another --out") from error
-    try:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise InputError(
-                f"{path}: other trials are written here; wait for them or choose another --out"
-            ) from None
-        size = os.fstat(descriptor).st_size
-        if size and not resume:
-            raise InputError(f"{path}: holds trials already; give --resume to go on, or another --out")
-        if size and os.pread(descriptor, 1, size - 1) != b"\n":
-            os.write(descriptor, b"\n")
-        yield Writer(descriptor)
-    finally:
-        os.close(descriptor)
+    return journal.writing(
+        folder / FILE_NAME,
+        msgspec.json.encode,
+        resume=resume,
+        holds="trials",
+        busy="other trials are written here; wait for them",
+    )

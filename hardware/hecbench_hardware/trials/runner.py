@@ -9,6 +9,7 @@ from typing import Any
 
 from hecbench import registry, trial_record
 from hecbench.errors import InputError
+from hecbench.journal import Writer
 from hecbench.registry import TrialObserver
 from hecbench.trial_record import Contents, Outcome, TrialRecord
 from hecbench_hardware.devices import DeviceFault
@@ -114,7 +115,7 @@ def _key(trial: Trial) -> trial_record.Key:
 
 def _until_decided(
     trial: Trial,
-    writer: trial_record.Writer,
+    writer: Writer[TrialRecord],
     provenance: dict[str, Any],
     report: Callable[[TrialRecord], object],
 ) -> None:
@@ -122,7 +123,7 @@ def _until_decided(
     for attempt in range(1, _ATTEMPTS + 1):
         record, fault = trial.run(attempt)
         record.provenance = provenance
-        writer.append(record)
+        writer.append([record])
         report(record)
         if fault is not None:
             raise _kept(fault)

@@ -1,0 +1,82 @@
+"""Append-only files of lines, each whole or absent: what results and trials are kept in.
+
+A line is written by one call and flushed to disk, so that a program that is killed loses at most the line it was
+writing. Appending starts on a fresh line, whatever came before, and one process writes at a time.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Generic, TypeVar
+
+from hecbench import files
+from hecbench.errors import HecbenchError, InputError
+
+T = TypeVar("T")
+
+
+def lines(path: Path) -> Iterator[tuple[int, bytes]]:
+    """Number, from 1, and content of every line that is not empty.
+
+    Raises:
+        InputError: the file is missing or unreadable.
+    """
+    for number, line in enumerate(files.read_bytes(path).split(b"\n"), start=1):
+        if line.strip():
+            yield number, line
+
+
+class Writer(Generic[T]):
+    """Appends to a file that this process alone has open (see `writing`)."""
+
+    def __init__(self, path: Path, descriptor: int, encode: Callable[[T], bytes]) -> None:
+        self._path, self._descriptor, self._encode = path, descriptor, encode
+
+    def append(self, items: Iterable[T]) -> None:
+        """Write the items, each as one line, and wait until they are on disk."""
+        for item in items:
+            line = self._encode(item) + b"\n"
+            if os.write(self._descriptor, line) != len(line):
+                raise HecbenchError(f"{self._path}: could not be written completely: is the disk full?")
+        os.fsync(self._descriptor)
+
+
+@contextmanager
+def writing(
+    path: Path, encode: Callable[[T], bytes], *, resume: bool, holds: str, busy: str
+) -> Iterator[Writer[T]]:
+    """Open a file for appending.
+
+    Args:
+        path: Of the file; its folder is made.
+        encode: An item as one line, without its break.
+        resume: Go on with what the file holds.
+        holds: What that is, for errors.
+        busy: Who else writes and what to do, for errors.
+
+    Raises:
+        InputError: It holds lines and `resume` is False, or another process writes to it.
+        HecbenchError: It cannot be written.
+    """
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        descriptor = os.open(path, os.O_RDWR | os.O_APPEND | os.O_CREAT, 0o666)
+    except OSError as error:
+        raise HecbenchError(f"{path}: cannot be written ({error.strerror}); choose another --out") from error
+    try:
+        try:
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except OSError:
+            raise InputError(f"{path}: {busy} or choose another --out") from None
+        size = os.fstat(descriptor).st_size
+        if size and not resume:
+            raise InputError(f"{path}: holds {holds} already; give --resume to go on, or another --out")
+        if size and os.pread(descriptor, 1, size - 1) != b"\n":
+            os.write(descriptor, b"\n")
+        yield Writer(path, descriptor, encode)
+    finally:
+        os.close(descriptor)
