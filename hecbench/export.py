@@ -34,7 +34,7 @@ OPTIONS = {
 """What `options` may hold; the command line offers each as --name."""
 
 _OPTICAL = "camera_optical_frame"
-_REP_103 = se3.from_quat_xyzw([-0.5, 0.5, -0.5, 0.5], [0.0, 0.0, 0.0])
+_REP_103 = se3.make([[0, 0, 1], [-1, 0, 0], [0, -1, 0]], [0, 0, 0])
 """link_T_optical: the link looks along x with z up, the optical frame along z with y down."""
 _FRAME_NAME = re.compile(r"[A-Za-z_][\w/.\-]*")
 
