@@ -36,9 +36,9 @@ _ON_PEG_RAD, _ON_BLOCK_RAD = 0.62, 0.43
 
 
 def planned(
-    image: Image, camera: CameraModel, seen: tags.TagPose, gripper: solids.Gripper, task: Task = Task.GRASP
+    image: Image, camera: CameraModel, seen: tags.TagPose, gripper: solids.Gripper, task: Task
 ) -> Image:
-    """The picture around the tag with its outline, its axes, and the tool where it will end."""
+    """The picture around the tag with its outline, its axes, and the tool where it is to end."""
     import cv2
 
     drawn = image.copy()
@@ -158,10 +158,8 @@ def write(
     model = model or cells.camera_model()
     base_T_workpiece = station.workpiece_pose(place)
     camera = lab_camera(station, model, sensor or Sensor(2, 2.0), 0)
-    camera.base_T_camera, camera.base_T_workpiece = (
-        station.camera_pose(calibration.number),
-        base_T_workpiece,
-    )
+    camera.base_T_camera = station.camera_pose(calibration.number)
+    camera.base_T_workpiece = base_T_workpiece
     try:
         image = camera.grab().image
     finally:
