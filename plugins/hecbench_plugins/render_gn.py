@@ -38,10 +38,12 @@ _RESTART_TURNS_DEG = ((0, 0, 0), (0, 0, 25), (0, 0, -25), (0, 20, 0), (0, -20, 0
 class RenderGN:
     """The options of the method.
 
-    An answer is believed when drawing and mask overlap by `sure_overlap`. Where less overlaps, either something hides
+    An answer is believed when drawing and mask overlap by `sure_overlap`, or `good_overlap` when the colours had no
+    say. Where less overlaps, either something hides
     part of the robot or the pose is wrong. What hides a part cuts pieces off the mask and leaves the rest of its
     contour in place, a wrong pose draws its contour elsewhere: besides `least_overlap`, a share `least_contour` of
-    the drawn contour must then lie within 2 px of the mask's, or the run is a failure.
+    the drawn contour must then lie within 2 px of the mask's, and without colours all but `most_violated` of it
+    between the pixel centres where the mask changes; or the run is a failure.
 
     Attributes:
         unknown: solved for besides the camera, each with a prior: joint offsets, scale of the robot, focal length.
@@ -99,10 +101,10 @@ class RenderGN:
 
     def _believe(self, views: list[View], end: evidence.End, overlap: float, trace: stages.Trace) -> None:
         """Raises SolverFailure when the mask contradicts the end; see the class."""
-        if overlap >= self.sure_overlap:
+        if overlap >= (self.sure_overlap if end.kind == "colour" else self.good_overlap):
             return
         found = evidence.contour_found(views, end.descent.pose, trace)
-        if overlap < self.least_overlap or found < self.least_contour:
+        if end.kind == "coverage" or overlap < self.least_overlap or found < self.least_contour:
             raise SolverFailure(
                 f"ended where drawing and mask overlap by {overlap:.2f} only and share {100 * found:.0f} % of the"
                 " contour: the start is too far off, or the masks show another robot or too little of it"
