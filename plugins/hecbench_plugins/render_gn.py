@@ -39,7 +39,7 @@ class RenderGN:
     """The options of the method.
 
     An answer is believed when drawing and mask overlap by `sure_overlap`, or `good_overlap` when the colours had no
-    say. Where less overlaps, either something hides
+    say or their descent no end. Where less overlaps, either something hides
     part of the robot or the pose is wrong. What hides a part cuts pieces off the mask and leaves the rest of its
     contour in place, a wrong pose draws its contour elsewhere: besides `least_overlap`, a share `least_contour` of
     the drawn contour must then lie within 2 px of the mask's, and without colours all but `most_violated` of it
@@ -101,10 +101,12 @@ class RenderGN:
 
     def _believe(self, views: list[View], end: evidence.End, overlap: float, trace: stages.Trace) -> None:
         """Raises SolverFailure when the mask contradicts the end; see the class."""
-        if overlap >= (self.sure_overlap if end.kind == "colour" else self.good_overlap):
+        colours = end.kind == "colour" and end.descent.ended != "iterations"
+        if overlap >= (self.sure_overlap if colours else self.good_overlap):
             return
         found = evidence.contour_found(views, end.descent.pose, trace)
-        if end.kind == "coverage" or overlap < self.least_overlap or found < self.least_contour:
+        settled = colours or end.kind == "intervals"
+        if not settled or overlap < self.least_overlap or found < self.least_contour:
             raise SolverFailure(
                 f"ended where drawing and mask overlap by {overlap:.2f} only and share {100 * found:.0f} % of the"
                 " contour: the start is too far off, or the masks show another robot or too little of it"
