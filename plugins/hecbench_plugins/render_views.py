@@ -230,13 +230,14 @@ def hidden_by_others(
     """Where (H, W) something neither robot, by the mask, nor background, by the picture, may hide the robot.
 
     Such places say nothing about the robot. What is thinner than `_SMALLEST_HIDING_PX` is a ragged edge of the mask.
+    Where more is other than is robot, the picture shows a furnished scene, and the mask alone says what hides.
     """
     import cv2
 
     off = np.abs(cv2.blur(image, (5, 5)) - background).max(-1) > _BACKGROUND_SPREAD
     other = (off & (mask < 0.5)).astype(np.uint8)
     thick = cv2.morphologyEx(other, cv2.MORPH_OPEN, np.ones((_SMALLEST_HIDING_PX,) * 2, np.uint8))
-    if not thick.any():
+    if not thick.any() or thick.mean() > (mask > 0.5).mean():
         return None
     return np.asarray(cv2.dilate(thick, np.ones((2 * _SOFT_EDGE_PX + 1,) * 2, np.uint8)) > 0)
 

@@ -169,3 +169,16 @@ def test_a_picture_of_something_else_is_a_failure(easy):
 
 def test_same_bytes_from_the_same_input(easy):
     np.testing.assert_array_equal(solve(easy).parent_T_camera, solve(easy).parent_T_camera)
+
+
+def test_a_furnished_scene_is_not_taken_for_hiding():
+    """A bar before a plain wall may hide the robot; more furniture than robot only surrounds it."""
+    from hecbench_plugins.render_views import hidden_by_others
+
+    image, mask = np.zeros((120, 160, 3), np.float32), np.zeros((120, 160), np.float32)
+    mask[40:80, 60:100] = 1
+    image[mask > 0] = 0.8
+    image[20:60, 100:120] = 0.5
+    assert hidden_by_others(image, np.zeros(3, np.float32), mask)[40, 110]
+    image[80:] = 0.5
+    assert hidden_by_others(image, np.zeros(3, np.float32), mask) is None
