@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import se3
+from hecbench import files, se3
 from hecbench.errors import InputError
 from hecbench.estimate import Estimate
 from hecbench.recording import Recording
@@ -107,13 +107,12 @@ def _rows(frames: list[Picture], columns: int) -> list[list[Picture]]:
 
 
 def _save(frames: list[Picture], path: Path) -> None:
-    """Write aside, then rename."""
+    """A picture, or an animation of several; whole or not at all."""
     from PIL import Image
 
     pictures = [Image.fromarray(frame) for frame in frames]
-    aside = path.with_name(f".{path.name}")
     options: dict[str, Any] = {}
     if len(pictures) > 1:
         options = {"save_all": True, "append_images": pictures[1:], "duration": _FRAME_MS, "loop": 0}
-    pictures[0].save(aside, format=path.suffix[1:].upper(), **options)
-    aside.replace(path)
+    with files.replacing(path) as stream:
+        pictures[0].save(stream, format=path.suffix[1:].upper(), **options)

@@ -20,6 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hecbench import se3
 from hecbench.errors import InputError
+from hecbench.recording import RobotDescription
 from hecbench.robot_meshes import Part, visual_parts
 
 Array = NDArray[np.float64]
@@ -222,6 +223,21 @@ def load_robot(name: str | Path, *, exclude: Iterable[str] = (), meshes: bool = 
             urdf = _airo_models() / "grippers" / GRIPPER / "urdf" / f"{GRIPPER}.urdf"
             model = model.with_tool(_from_urdf(urdf, GRIPPER, meshes), "tool0", "gripper/")
     return model.without(exclude) if meshes else model
+
+
+def flange_poses(robot: RobotDescription, joints_rad: Array) -> Array:
+    """base_T_flange (N, 4, 4) m of joints (N, J) by the described model; NaN rows where joints are unknown.
+
+    Raises:
+        InputError: there is no such model, link or joint, or joints lie outside their limits.
+    """
+    base_T_flange = np.full((len(joints_rad), 4, 4), np.nan)
+    known = np.isfinite(joints_rad).all(1)
+    model = load_robot(robot.urdf or str(robot.model), meshes=False)
+    base_T_flange[known] = model.forward(
+        joints_rad[known], robot.joint_names or None, base=robot.base_link, tip=robot.flange_link
+    )
+    return base_T_flange
 
 
 def _airo_models() -> Path:

@@ -20,7 +20,7 @@ from hecbench.errors import InputError, Refusal, SolverFailure
 from hecbench.estimate import Estimate, Status, Termination
 from hecbench.evidence import Evidence
 from hecbench.recording import Recording
-from hecbench.robot import load_robot
+from hecbench.robot import flange_poses
 from hecbench.specs import DatasetSpec, EvaluatorSpec, Into, Kind, Need, ObserverSpec, SolverSpec, SuiteSpec
 
 _OBSERVED = (Need.CORNERS, Need.TARGET_POSES)
@@ -106,13 +106,7 @@ def with_robot_poses(recording: Recording) -> Recording:
     lacks_all = recording.base_T_flange is None
     if not lacks_all or joints_rad is None or robot is None or not (robot.model or robot.urdf):
         return recording
-    base_T_flange = np.full((len(recording), 4, 4), np.nan)
-    known = np.isfinite(joints_rad).all(1)
-    model = load_robot(robot.urdf or str(robot.model), meshes=False)
-    base_T_flange[known] = model.forward(
-        joints_rad[known], robot.joint_names or None, base=robot.base_link, tip=robot.flange_link
-    )
-    return replace(recording, base_T_flange=base_T_flange)
+    return replace(recording, base_T_flange=flange_poses(robot, joints_rad))
 
 
 def solve(
@@ -126,10 +120,15 @@ def solve(
 
     `say` gets each note about how the recording was read and what was computed from it.
     """
-    origin = _provenance(recording, options)
-    recording = prepare(recording)
-    for note in recording.notes:
+    prepared = prepare(recording)
+    for note in prepared.notes:
         say(note)
+    return _solve_prepared(prepared, specs, options, _provenance(recording, options))
+
+
+def _solve_prepared(
+    recording: Recording, specs: Iterable[SolverSpec], options: Options, origin: dict[str, Any]
+) -> list[Estimate]:
     blind = recording.without_truth()
     return [
         replace(
@@ -259,20 +258,19 @@ def execute(task: Task, options: Options) -> tuple[list[Estimate], Evidence | No
     """Run one task, the unit of parallel work; a recording from disk is examined too, for the report."""
     specs = [registry.load().get(Kind.SOLVER, name, SolverSpec) for name in task.solvers]
     recording = task.recording(options.seed)
+    prepared = prepare(recording)
     estimates = [
         replace(estimate, suite=task.suite or "files", level=task.level, item=task.item)
-        for estimate in solve(recording, specs, options)
+        for estimate in _solve_prepared(prepared, specs, options, _provenance(recording, options))
     ]
-    return estimates, None if task.path is None else _examined(recording)
+    return estimates, None if task.path is None else _examined(recording, prepared)
 
 
-def _examined(recording: Recording) -> Evidence:
+def _examined(recording: Recording, prepared: Recording) -> Evidence:
     findings = diagnose.check(recording, prepare)
     influence = next((dict(f.per_sample) for f in findings if f.id == "influence"), {})
     influence_mm = np.array([influence.get(sample, np.nan) for sample in recording.sample_ids])
-    return evidence.collect(
-        prepare(recording), recording.sha256, [f.to_json() for f in findings], influence_mm
-    )
+    return evidence.collect(prepared, recording.sha256, [f.to_json() for f in findings], influence_mm)
 
 
 def remaining(tasks: Iterable[Task], done: Iterable[Estimate], options: Options) -> list[Task]:

@@ -15,7 +15,7 @@ from hecbench.diagnose.calibrate import assumed_points, calibrate, enclosing_poi
 from hecbench.diagnose.fit import LEAST_SAMPLES, Fit
 from hecbench.errors import HecbenchError, SolverFailure
 from hecbench.recording import Mounting, Recording
-from hecbench.robot import load_robot
+from hecbench.robot import flange_poses
 
 Array = NDArray[np.float64]
 
@@ -149,16 +149,10 @@ class Case:
         robot, joints_rad = self.recording.robot, self.recording.joints_rad
         if robot is None or joints_rad is None or not (robot.model or robot.urdf):
             return None
-        poses = np.full((len(joints_rad), 4, 4), np.nan)
-        known = np.isfinite(joints_rad).all(1)
         try:
-            model = load_robot(robot.urdf or str(robot.model), meshes=False)
-            poses[known] = model.forward(
-                joints_rad[known], robot.joint_names or None, base=robot.base_link, tip=robot.flange_link
-            )
+            return flange_poses(robot, joints_rad)
         except HecbenchError:
             return None
-        return poses
 
     @property
     def noise_factor(self) -> float:

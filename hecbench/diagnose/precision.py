@@ -13,10 +13,9 @@ from hecbench.bundle_model import Problem, State, linearise
 from hecbench.diagnose.case import Case
 from hecbench.diagnose.fit import TYPICAL_NOISE
 from hecbench.recording import Mounting
+from hecbench.workspace import cube_corners
 
 Array = NDArray[np.float64]
-
-CUBE_M = 0.4
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,8 +83,7 @@ def precision(case: Case) -> Precision | None:
 
 def _workspace_points(mounting: Mounting, base_T_flange: Array) -> Array:
     """The corners of a cube around the mean flange position, in the parent frame, as in the rulers."""
-    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T
-    corners = base_T_flange[:, :3, 3].mean(0) + CUBE_M / 2 * signs
+    corners = cube_corners(base_T_flange)
     if mounting is Mounting.EYE_TO_HAND:
-        return np.asarray(corners)
+        return corners
     return se3.transform_points(se3.inverse(base_T_flange), corners).reshape(-1, 3)

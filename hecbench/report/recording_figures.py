@@ -16,13 +16,12 @@ from hecbench.evidence import Evidence
 from hecbench.recording import CameraModel, Mounting
 from hecbench.rendering.undistort import distort
 from hecbench.report.svg import DARK, LIGHT, RED, panel, svg
+from hecbench.workspace import cube_corners
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
-
-_CUBE_M = 0.4
 
 
 def project(camera: CameraModel, points_c: Array) -> Array:
@@ -126,8 +125,7 @@ def agreement_figure(evidence: Evidence, estimates: Sequence[Estimate]) -> str |
     if len(answered) < 2 or evidence.base_T_flange is None:
         return None
     base_T_flange = evidence.base_T_flange[np.isfinite(evidence.base_T_flange).all((1, 2))]
-    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T
-    points = base_T_flange[:, :3, 3].mean(0) + _CUBE_M / 2 * signs
+    points = cube_corners(base_T_flange)
     chain = np.eye(4)[None] if evidence.mounting is Mounting.EYE_TO_HAND else base_T_flange
     answers = np.array([e.parent_T_camera for e in answered])
     in_camera = se3.transform_points(se3.inverse(chain[:, None] @ answers), points)

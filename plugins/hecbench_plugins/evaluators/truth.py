@@ -12,11 +12,9 @@ from hecbench.estimate import Estimate
 from hecbench.recording import Mounting, Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Column, EvaluatorSpec, Into
+from hecbench.workspace import cube_corners
 
 Array = NDArray[np.float64]
-
-CUBE_M = 0.4
-"""Side of the cube of workspace points of the target registration error."""
 
 
 def errors(
@@ -49,8 +47,7 @@ def target_registration_error_m(estimated: Array, true: Array, recording: Record
     """
     assert recording.base_T_flange is not None
     base_T_flange = recording.base_T_flange[np.isfinite(recording.base_T_flange).all((1, 2))]
-    signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, 8).T
-    points_m = base_T_flange[:, :3, 3].mean(0) + CUBE_M / 2 * signs
+    points_m = cube_corners(base_T_flange)
     error = estimated @ se3.inverse(true)
     if recording.mounting is Mounting.EYE_IN_HAND:
         error = base_T_flange @ error @ se3.inverse(base_T_flange)
