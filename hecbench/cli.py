@@ -67,7 +67,17 @@ def cli() -> None:
 _json = click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else.")
 _seed = click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 _solver = click.option(
-    "--solver", "solvers", multiple=True, metavar="NAME", help="Repeatable; default: all that can."
+    "--solver",
+    "solvers",
+    multiple=True,
+    metavar="NAME",
+    help="Repeatable; NAME[OPTION=VALUE,...] sets options of it; default: all that can.",
+)
+_unknown = click.option(
+    "--unknown",
+    type=click.Choice(["joints", "scale", "focal"]),
+    multiple=True,
+    help="Solve for this too, by every solver with the option `unknown`; repeatable.",
 )
 _folder = click.Path(path_type=Path, file_okay=False)
 _file = click.Path(path_type=Path, dir_okay=False)
@@ -119,6 +129,7 @@ def plugins(kind: str | None, as_json: bool) -> None:
 @cli.command()
 @click.argument("recording", type=_any_path)
 @_solver
+@_unknown
 @click.option("--views", type=click.IntRange(min=1), help="Use this many samples, drawn with --seed.")
 @click.option("--init", type=_file, help="An estimate to start from instead of initial_parent_T_camera.")
 @click.option(
@@ -132,6 +143,7 @@ def plugins(kind: str | None, as_json: bool) -> None:
 def solve(
     recording: Path,
     solvers: tuple[str, ...],
+    unknown: tuple[str, ...],
     views: int | None,
     init: Path | None,
     held_out: bool | None,
@@ -145,7 +157,7 @@ def solve(
     from hecbench.report.tables import Group, table
 
     loaded = planning.adjusted(runner.load_recording(recording), views, init, seed)
-    specs = planning.solvers_for(solvers, loaded)
+    specs = planning.with_unknowns(planning.solvers_for(solvers, loaded), unknown)
     if not specs:
         raise HecbenchError(
             f"{recording}: no ready solver can use what it offers: {', '.join(sorted(loaded.offers()))}"

@@ -42,6 +42,23 @@ def solvers_for(names: Sequence[str], recording: Recording) -> list[SolverSpec]:
     return [spec for spec in known.ready(Kind.SOLVER, SolverSpec) if spec.needs <= offers]
 
 
+def with_unknowns(specs: Sequence[SolverSpec], unknown: Sequence[str]) -> list[SolverSpec]:
+    """The solvers, those with the option `unknown` told to solve for these too.
+
+    Raises:
+        InputError: none of them has the option.
+    """
+    able = [any(option.name == "unknown" for option in spec.options) for spec in specs]
+    if not unknown:
+        return list(specs)
+    if not any(able):
+        raise InputError(
+            f"--unknown {unknown[0]}: no solver of these can: name one that has the option `unknown`"
+        )
+    settings = {"unknown": "+".join(unknown)}
+    return [spec.configured(settings) if can else spec for spec, can in zip(specs, able, strict=True)]
+
+
 def tasks(
     sources: Sequence[str], solvers: Sequence[str], levels: Sequence[str], samples: int | None, seed: int
 ) -> list[Task]:
@@ -74,7 +91,8 @@ def suite_tasks(
             raise InputError(f"--level {level}: the suite '{name}' has {', '.join(suite.levels)}")
     found = []
     for level in levels or suite.levels:
-        names = tuple(spec.name for spec in solvers_for(solvers, suite.make(level, 0, seed)))
+        meant = solvers or suite.solvers(level)
+        names = tuple(spec.name for spec in solvers_for(meant, suite.make(level, 0, seed)))
         indices = range(samples or suite.default_samples)
         found += [Task(names, suite=name, level=level, index=index) for index in indices]
     return found

@@ -59,10 +59,17 @@ class Plugin:
             "kind": self.kind,
             "status": self.status,
             "needs": needs,
-            "detail": self.detail or (self.spec.summary if self.spec else ""),
+            "detail": self.detail or self._about(),
             "distribution": self.distribution,
             "version": self.version,
         }
+
+    def _about(self) -> str:
+        if self.spec is None:
+            return ""
+        options = self.spec.options if isinstance(self.spec, SolverSpec) else ()
+        told = "".join(f"; [{option.name}=...]: {option.summary}" for option in options)
+        return self.spec.summary + told
 
 
 @dataclass(frozen=True)
@@ -82,15 +89,30 @@ class Registry:
         return [spec for spec in specs if isinstance(spec, spec_type)]
 
     def get(self, kind: Kind, name: str, spec_type: type[AnySpecT]) -> AnySpecT:
-        """The ready spec of that name; otherwise an `InputError` that says why not and what there is."""
-        found = [plugin for plugin in self.select(kind) if plugin.name == name]
+        """The ready spec of that name; otherwise an `InputError` that says why not and what there is.
+
+        A solver's name may set options of it: ``name[option=value,...]``.
+        """
+        plain, settings = _settings(name) if kind is Kind.SOLVER else (name, {})
+        found = [plugin for plugin in self.select(kind) if plugin.name == plain]
         if not found:
             names = ", ".join(spec.name for spec in self.ready(kind, spec_type)) or "none"
-            raise InputError(f"no {kind} is called '{name}': choose one of {names}")
+            raise InputError(f"no {kind} is called '{plain}': choose one of {names}")
         plugin = found[0]
         if plugin.status is not PluginStatus.READY or not isinstance(plugin.spec, spec_type):
-            raise InputError(f"{kind} '{name}' is {plugin.status}: {plugin.detail}")
-        return plugin.spec
+            raise InputError(f"{kind} '{plain}' is {plugin.status}: {plugin.detail}")
+        return plugin.spec.configured(settings) if isinstance(plugin.spec, SolverSpec) else plugin.spec
+
+
+def _settings(name: str) -> tuple[str, dict[str, str]]:
+    """A solver's name and the options set in it: ``name[option=value,...]``."""
+    plain, bracket, rest = name.partition("[")
+    if not bracket:
+        return name, {}
+    pairs = [setting.partition("=") for setting in rest.removesuffix("]").split(",")]
+    if not rest.endswith("]") or not all(option and equals for option, equals, _ in pairs):
+        raise InputError(f"solver '{name}': write options as {plain or 'solver'}[option=value,option=value]")
+    return plain, {option.strip(): value.strip() for option, _, value in pairs}
 
 
 @cache

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar, Protocol
+from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
 
 import numpy as np
 
+from hecbench.errors import InputError
 from hecbench.needs import Need as Need
 
 if TYPE_CHECKING:
@@ -50,16 +52,54 @@ class Spec:
     imports: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True)
+class Option:
+    """A setting that a user may give a solver by name, as in ``solver[name=value]``.
+
+    `parse` turns the text of the value into what the factory takes, and raises `ValueError` for a bad one.
+    """
+
+    name: str
+    parse: Callable[[str], Any]
+    summary: str
+
+
 @dataclass(frozen=True, kw_only=True)
 class SolverSpec(Spec):
     """A calibration method. `factory()` imports what is heavy and returns the `Solver`."""
 
     kind: ClassVar[Kind] = Kind.SOLVER
-    factory: Callable[[], Solver]
+    factory: Callable[..., Solver]
     needs: frozenset[Need]
     reference: str
     slow: bool = False
     """Folds of the held-out ruler run only when asked for (renderer methods)."""
+    options: tuple[Option, ...] = ()
+    """Keyword arguments that `factory` takes, all optional."""
+
+    def configured(self, settings: Mapping[str, str]) -> Self:
+        """The solver with some options set; its name tells them: ``name[option=value,...]``.
+
+        Raises:
+            InputError: there is no such option, or its value is not understood.
+        """
+        known = {option.name: option for option in self.options}
+        values = {}
+        for name, text in settings.items():
+            if name not in known:
+                offered = "; ".join(f"{option.name}: {option.summary}" for option in self.options) or "none"
+                raise InputError(f"solver '{self.name}' has no option '{name}'. It has {offered}")
+            try:
+                values[name] = known[name].parse(text)
+            except ValueError as error:
+                raise InputError(
+                    f"solver '{self.name}': option {name}={text} is not understood ({error});"
+                    f" {name}: {known[name].summary}"
+                ) from error
+        if not values:
+            return self
+        told = ",".join(f"{name}={settings[name]}" for name in sorted(settings))
+        return replace(self, name=f"{self.name}[{told}]", factory=partial(self.factory, **values), options=())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,12 +113,16 @@ class DatasetSpec(Spec):
 
 @dataclass(frozen=True, kw_only=True)
 class SuiteSpec(Spec):
-    """Generated recordings. `make(level, index, seed)` depends on nothing else: items stream in any order."""
+    """Generated recordings. `make(level, index, seed)` depends on nothing else: items stream in any order.
+
+    `solvers(level)` names those that a level is meant for; without it all take part that its recordings can feed.
+    """
 
     kind: ClassVar[Kind] = Kind.SUITE
     levels: tuple[str, ...]
     default_samples: int
     make: Callable[[str, int, int], Recording]
+    solvers: Callable[[str], tuple[str, ...]] = lambda level: ()
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,6 +20,16 @@ def hecbench_solvers():
                      imports={imports}, reference="r")
 """
 
+CONFIGURABLE = """
+from hecbench.registry import hookimpl
+from hecbench.specs import Option, SolverSpec
+
+@hookimpl
+def hecbench_solvers():
+    yield SolverSpec(name="third", summary="s", factory=lambda rounds=1, weight=0.5: (rounds, weight),
+                     needs=frozenset(), reference="r", options=(Option("rounds", int, "how often"), Option("weight", float, "of it")))
+"""
+
 OBSERVER = """
 from hecbench.registry import hookimpl
 
@@ -113,3 +123,28 @@ def test_a_misspelt_argument_of_an_observer_is_broken(entry_point):
     found = registry.build([entry_point("third_misspelt", OBSERVER.format(argument="trail"))])
     assert [plugin.status for plugin in found.plugins] == ["broken"]
     assert found.trial_observers == {}
+
+
+def test_options_in_a_solvers_name_reach_its_factory(entry_point):
+    plugins = registry.build([entry_point("third_options", CONFIGURABLE)])
+    spec = plugins.get(Kind.SOLVER, "third[weight=2, rounds=3]", SolverSpec)
+    assert spec.factory() == (3, 2.0)
+    assert spec.name == "third[rounds=3,weight=2]"
+    assert plugins.get(Kind.SOLVER, "third", SolverSpec).factory() == (1, 0.5)
+    assert "rounds=" in plugins.select()[0].row()["detail"]
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("third[speed=1]", "has no option 'speed'"),
+        ("third[rounds=many]", "rounds=many is not understood"),
+        ("third[rounds]", r"write options as third\[option=value"),
+        ("third[rounds=1", "write options"),
+        ("fourth[rounds=1]", "no solver is called 'fourth'"),
+    ],
+)
+def test_wrong_options_are_refused_with_the_cure(entry_point, name, said):
+    plugins = registry.build([entry_point("third_options", CONFIGURABLE)])
+    with pytest.raises(InputError, match=said):
+        plugins.get(Kind.SOLVER, name, SolverSpec)

@@ -3,42 +3,41 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
-from functools import partial
 
 from hecbench.registry import hookimpl
-from hecbench.specs import Need, Solver, SolverSpec
-
-_ALSO_SOLVED = {
-    "joints": "the offset of every joint",
-    "scale": "the robot's scale",
-    "focal": "the focal length",
-}
+from hecbench.specs import Need, Option, Solver, SolverSpec
 
 
-def _render_gn(*unknown: str) -> Solver:
+def _render_gn(unknown: tuple[str, ...] = ()) -> Solver:
     from hecbench_plugins.render_gn import RenderGN
     from hecbench_plugins.render_unknowns import Unknown
 
     return RenderGN(unknown=tuple(Unknown(name) for name in unknown))
 
 
+def _unknowns(text: str) -> tuple[str, ...]:
+    names = tuple(text.split("+"))
+    for name in names:
+        if name not in ("joints", "scale", "focal"):
+            raise ValueError(f"'{name}' is none of joints, scale, focal")
+    return names
+
+
 @hookimpl
 def hecbench_solvers() -> Iterable[SolverSpec]:
-    """The method alone, and with each of the other unknowns that it can solve for."""
-    common = SolverSpec(
+    """This file's method."""
+    yield SolverSpec(
         name="render_gn",
         summary="renders the robot and aligns it by Gauss-Newton: silhouette, then colours or edges",
         factory=_render_gn,
         needs=frozenset({Need.ROBOT_MODEL, Need.JOINTS, Need.INTRINSICS, Need.INITIAL}),
         reference="own; object-space edges after Loper and Black 2014 (OpenDR) and Laine et al. 2020",
         slow=True,
+        options=(
+            Option(
+                "unknown",
+                _unknowns,
+                "solved for too, within a prior: joints, scale, focal, or several with +",
+            ),
+        ),
     )
-    yield common
-    for unknown, what in _ALSO_SOLVED.items():
-        yield replace(
-            common,
-            name=f"render_gn_{unknown}",
-            summary=f"like render_gn, with {what} unknown too, within a prior",
-            factory=partial(_render_gn, unknown),
-        )
