@@ -114,10 +114,10 @@ class Renderer:
         K = np.asarray(self.K, float)
         self._intrinsics[[0, 1, 3]] = factor * np.array([K[0, 0], K[0, 1], K[1, 1]])
 
-    def draw(self, camera_T_link: ArrayLike) -> int:
-        """Rasterise the robot with its links at camera_T_link (L, 4, 4); returns the number of crossings.
+    def rasterise(self, camera_T_link: ArrayLike) -> None:
+        """Only the part of `draw` that finds what each pixel centre sees: `face`, `nearness`, `depth`, `part`, `link`.
 
-        Afterwards `image`, `crossings`, `depth`, `part` and `link` belong to this pose.
+        The crossings, and with them `image`, stay those of the last `draw`.
         """
         poses = np.asarray(camera_T_link)
         if (
@@ -142,6 +142,14 @@ class Renderer:
         self.dropped = kernels.rasterise(
             self._screen, mesh.faces, self._front, self._order, self.nearness, self.face, self.box
         )
+
+    def draw(self, camera_T_link: ArrayLike) -> int:
+        """Rasterise the robot with its links at camera_T_link (L, 4, 4); returns the number of crossings.
+
+        Afterwards `image`, `crossings`, `depth`, `part` and `link` belong to this pose.
+        """
+        self.rasterise(camera_T_link)
+        mesh = self.mesh
         self._count = kernels.find_crossings(
             self._screen,
             mesh.edge_ends,

@@ -27,7 +27,8 @@ from hecbench.specs import Option, SolverSpec
 @hookimpl
 def hecbench_solvers():
     yield SolverSpec(name="third", summary="s", factory=lambda rounds=1, weight=0.5: (rounds, weight),
-                     needs=frozenset(), reference="r", options=(Option("rounds", int, "how often"), Option("weight", float, "of it")))
+                     needs=frozenset(), reference="r",
+                     options=(Option("rounds", int, "how often"), Option("weight", float, "of it")))
 """
 
 OBSERVER = """
