@@ -20,7 +20,7 @@ Picture = NDArray[np.float32]
 
 LEVELS = (4, 2, 1)
 """Pixels of the recording per pixel of a level, coarse to fine."""
-_COARSE_CELL_M = {4: 0.004, 2: 0.0015, 1: 0.0}
+_COARSE_CELL_M = {8: 0.01, 4: 0.004, 2: 0.0015, 1: 0.0}
 _LEAST_MASK, _MOST_MASK = 1e-3, 0.95
 _BACKGROUND_SPREAD = 0.08
 _SMALLEST_HIDING_PX, _SOFT_EDGE_PX = 9, 2
@@ -30,7 +30,7 @@ _SMALLEST_HIDING_PX, _SOFT_EDGE_PX = 9, 2
 def robot_and_meshes(name: str | Path) -> tuple[RobotModel, dict[int, RenderMesh]]:
     """The model and its meshes by level; merged cells move no contour by more than a tenth of a level's pixel."""
     model = load_robot(name)
-    return model, {level: RenderMesh.of(model, cell_m=_COARSE_CELL_M[level]) for level in LEVELS}
+    return model, {level: RenderMesh.of(model, cell_m=cell_m) for level, cell_m in _COARSE_CELL_M.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,17 +78,22 @@ class Kinematics:
     joint_names: tuple[str, ...]
     parent: str
 
+    def checked(self, joints_rad: Array) -> Array:
+        """The same of many samples (N, J); an `InputError` for joints beyond their limits."""
+        return self.model.link_poses(joints_rad, self.joint_names, frame=self.parent)
+
     def __call__(self, joints_rad: Array) -> Array:
         """Joints beyond their limits are taken at them."""
         lower, upper = self.model.limits(self.joint_names).T
         return self.model.link_poses(np.clip(joints_rad, lower, upper), self.joint_names, frame=self.parent)
 
 
-def prepare(recording: Recording) -> tuple[Kinematics, list[View]]:
-    """The moving robot and the views of a recording.
+def moving_robot(recording: Recording) -> tuple[Kinematics, dict[int, RenderMesh]]:
+    """The moving robot of a recording and its meshes by level.
 
     Raises:
-        Refusal: no intrinsics, robot, joints or pictures, or a mask without (or with nothing but) robot.
+        Refusal: no intrinsics, robot or joints.
+        InputError: there is no such robot, or its description is faulty.
     """
     robot, camera = recording.robot, recording.camera
     if robot is None or (robot.model is None and robot.urdf is None):
@@ -97,12 +102,24 @@ def prepare(recording: Recording) -> tuple[Kinematics, list[View]]:
         raise Refusal("the camera's intrinsics are unknown")
     if recording.joints_rad is None:
         raise Refusal("no sample has joints_rad")
+    model, meshes = robot_and_meshes(robot.urdf or str(robot.model))
+    names = robot.joint_names or model.joint_names[: recording.joints_rad.shape[1]]
+    return Kinematics(model, tuple(names), recording.parent_link), meshes
+
+
+def prepare(recording: Recording) -> tuple[Kinematics, list[View]]:
+    """The moving robot and the views of a recording.
+
+    Raises:
+        Refusal: no intrinsics, robot, joints or pictures, or a mask without (or with nothing but) robot.
+    """
     try:
-        model, meshes = robot_and_meshes(robot.urdf or str(robot.model))
-        names = robot.joint_names or model.joint_names[: recording.joints_rad.shape[1]]
+        kinematics, meshes = moving_robot(recording)
+        assert recording.joints_rad is not None
+        assert recording.camera is not None
         rows = np.flatnonzero(np.isfinite(recording.joints_rad).all(1))
-        poses = model.link_poses(recording.joints_rad[rows], names, frame=recording.parent_link)
-        pinhole = Undistortion.of(camera)
+        poses = kinematics.checked(recording.joints_rad[rows])
+        pinhole = Undistortion.of(recording.camera)
         views = [
             _view(recording, int(row), parent_T_link, meshes, pinhole)
             for row, parent_T_link in zip(rows, poses, strict=True)
@@ -112,7 +129,7 @@ def prepare(recording: Recording) -> tuple[Kinematics, list[View]]:
     found = [view for view in views if view is not None]
     if not found:
         raise Refusal("no sample with joints has an image or a mask")
-    return Kinematics(model, tuple(names), recording.parent_link), found
+    return kinematics, found
 
 
 def _view(

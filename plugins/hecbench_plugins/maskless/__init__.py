@@ -1,0 +1,1 @@
+"""Calibration from raw photographs: no masks, no markers, no training, a rough start or none."""

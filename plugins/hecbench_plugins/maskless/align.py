@@ -1,0 +1,371 @@
+"""Refinement without masks: where along its normal does each drawn contour point really lie?
+
+After region-based tracking (Prisacariu and Reid 2012, "PWP3D"; Stoiber et al. 2022, "SRT3D"), derived anew: colour
+histograms of every part and of what surrounds it give each line across the contour a posterior of the contour's place;
+their means pull the camera in a Gauss-Newton step stacked over all views, their variances weigh it. Silhouettes and
+boundaries between materials count alike. Where the background is known (a fixed camera, three views or more) it takes
+the place of the surroundings' histogram.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hecbench import se3
+from hecbench.rendering import Renderer, RenderMesh
+from hecbench_plugins import scene_background
+from hecbench_plugins.maskless import kernels
+from hecbench_plugins.maskless.canvas import Canvas, Images, shrunk_intrinsics
+
+Array = NDArray[np.float64]
+Bits = NDArray[np.bool_]
+
+HALF_LINE = 8
+"""Samples on each side of the contour."""
+CORRELATED_POINTS = 30.0
+"""Neighbouring contour points of an image that say as much as one alone."""
+FEWEST_POINTS = 30
+_COARSEST_PX = 400
+_BAND_PX = 20
+_LEAST_SIGMA_PX = 0.7
+_CLIP_SHARE = 0.9
+_MOST_MOVE_RAD, _MOST_MOVE_M = 0.1, 0.05
+_SETTLED = 0.1
+"""Standard deviations of the answer that a move must not exceed for the refinement to have converged."""
+_DAMPING = 1e-3
+_GROUP_SHARE, _FEWEST_COUNTS = 0.3, 50.0
+_SHARP_PX, _CENTRED_PX = 2.0, 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Background:
+    """What a fixed camera sees without the robot: (H, W, 3) RGB, and the share (H, W) of the views that show it."""
+
+    image: Images
+    agreement: NDArray[np.float32]
+
+    @staticmethod
+    def of(images: Images) -> Background:
+        """From photographs (N, H, W, 3) of one fixed camera."""
+        image, agreement = scene_background.background(images)
+        return Background(np.round(image).astype(np.uint8), agreement)
+
+
+@dataclass(frozen=True)
+class Step:
+    """A round of refinement: canvas pixels per pixel, pixels between samples, iterations, and with which background."""
+
+    level: int
+    spacing: float
+    rounds: int
+    background: bool
+
+
+def schedule(width_px: int) -> tuple[tuple[Step, ...], Step]:
+    """The steps from a start decimetres away, and the last one, for a canvas of this width."""
+    coarsest = 1
+    while width_px / coarsest > _COARSEST_PX:
+        coarsest *= 2
+    steps = [Step(coarsest, 4, 8, True), Step(coarsest, 2, 6, True)]
+    level = coarsest // 2
+    while level > 1:
+        steps += [Step(level, 2, 4, True), Step(level, 1, 5, True)]
+        level //= 2
+    if coarsest <= 2:
+        steps.append(Step(1, 2, 4, True))
+    return tuple(steps), Step(1, 1, 15, False)
+
+
+class _Buffers:
+    """What one thread writes into."""
+
+    def __init__(self, mesh: RenderMesh, K: Array, width: int, height: int) -> None:
+        self.renderer = Renderer(mesh, K, width, height)
+        histograms = (len(mesh.part_names), kernels.BINS**3)
+        self.inside, self.around = (np.zeros(histograms, np.float32) for _ in range(2))
+        self.covered = np.zeros((height, width), np.int16)
+        points = 16 * (width + height) + 32768
+        self.contour, self.normal_rate = np.zeros((points, 4)), np.zeros((points, 3))
+        self.parts, self.kept = np.zeros((points, 2), np.int32), np.zeros(points, np.int32)
+        self.mean, self.variance = np.zeros(points), np.zeros(points)
+
+
+@dataclass(frozen=True, eq=False)
+class Round:
+    """The normal equations of one pose: sums, per-view gradients, and how well the lines agree with the contour."""
+
+    A: Array
+    b: Array
+    view_A: Array
+    view_b: Array
+    squares: float
+    points: int
+    view_sharp: Array
+    """(N,) share of each view's contour points whose posterior is narrow and centred."""
+    view_judged: NDArray[np.int64]
+    """(N,) contour points of each view that the image could judge."""
+
+    @property
+    def sharp(self) -> float:
+        """Share of all judged contour points that the images confirm."""
+        return float(self.view_sharp @ self.view_judged / max(self.view_judged.sum(), 1))
+
+
+@dataclass(eq=False)
+class Lines:
+    """All views of a canvas at one size; remembers the colours found at the last pose it was asked about.
+
+    Attributes:
+        canvas: at full size.
+        level: canvas pixels per pixel.
+        background: of the full canvas, None where it is not known.
+        threads: that share the views.
+        parent_T_link: (N, L, 4, 4) m, the canvas' until somebody corrects the joints.
+        renders: pictures drawn so far.
+    """
+
+    mesh: RenderMesh
+    canvas: Canvas
+    level: int
+    background: Background | None
+    threads: int
+    parent_T_link: Array = field(init=False)
+    renders: int = field(default=0, init=False)
+
+    def __post_init__(self) -> None:
+        import cv2
+
+        self.parent_T_link = self.canvas.parent_T_link
+        height, width = (size // self.level for size in self.canvas.valid.shape)
+
+        def small(picture: NDArray[np.generic]) -> NDArray[np.generic]:
+            if self.level == 1:
+                return picture
+            return np.asarray(cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA))
+
+        def prepared(image: Images) -> tuple[Images, Images]:
+            shrunk = np.ascontiguousarray(small(image), np.uint8)
+            return shrunk, np.asarray(cv2.GaussianBlur(shrunk, (0, 0), 0.8), np.uint8)
+
+        self._pool = ThreadPoolExecutor(self.threads)
+        pairs = list(self._pool.map(prepared, self.canvas.images))
+        self._images, self._smooth = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
+        whole = np.asarray(small(255 * self.canvas.valid.astype(np.uint8))) > 254
+        self._valid = np.asarray(cv2.erode(whole.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0)
+        self._background = np.zeros((0, width, 3), np.uint8)
+        self._agreement = np.zeros((0, width), np.float32)
+        if self.background is not None:
+            self._background = np.ascontiguousarray(small(self.background.image), np.uint8)
+            self._agreement = np.ascontiguousarray(small(self.background.agreement), np.float32)
+        K = shrunk_intrinsics(self.canvas.K, 1 / self.level, 1 / self.level)
+        _, material = np.unique(self.mesh.colours.round(3), axis=0, return_inverse=True)
+        self._material = material.reshape(-1).astype(np.int64)
+        size, parts = kernels.BINS**3, len(self.mesh.part_names)
+        self._one_group = np.zeros(parts, np.int64)
+        self._scratch = np.zeros((int(self._material.max()) + 3, size))
+        self._log_inside, self._log_around = (np.zeros((parts, size), np.float32) for _ in range(2))
+        self._mean_around = np.zeros(size, np.float32)
+        self._covered = np.zeros((height, width), np.int16)
+        self._buffers = [
+            _Buffers(self.mesh, K, width, height) for _ in range(min(self.threads, len(self.canvas)))
+        ]
+
+    def __call__(
+        self,
+        camera_T_parent: Array,
+        spacing: float,
+        *,
+        twists: Sequence[Array] = (),
+        radius_m: float = 0.0,
+    ) -> Round:
+        """Compare the contours drawn at a pose with the images by the known colours; learns those of this pose.
+
+        Args:
+            camera_T_parent: (4, 4).
+            spacing: px between samples of a line.
+            twists: per view, (M - 6, L, 6) left twists in the camera frame of the links by further unknowns.
+            radius_m: contour points seen within this distance of the flange are left out.
+        """
+        extra = twists if len(twists) else [np.zeros((0, 1, 6))] * len(self.canvas)
+        rows = self._over_views(
+            camera_T_parent,
+            spacing,
+            radius_m,
+            lambda buffers, view, count: self._compared(buffers, view, count, spacing, extra[view]),
+        )
+        A, b, squares, used, sharp, judged = (np.array(column) for column in zip(*rows, strict=True))
+        return Round(A.sum(0), b.sum(0), A, b, float(squares.sum()), int(used.sum()), sharp, judged)
+
+    def learn(self, camera_T_parent: Array, spacing: float) -> None:
+        """Find the colours of the parts and of what is around them at a pose (4, 4)."""
+        self._over_views(camera_T_parent, spacing, 0.0, None)
+
+    def _over_views(
+        self,
+        camera_T_parent: Array,
+        spacing: float,
+        radius_m: float,
+        compare: Callable[[_Buffers, int, int], Any] | None,
+    ) -> list[Any]:
+        """Draw and compare every view; the colours that are met meanwhile become the known ones afterwards."""
+        reach = int(max(_BAND_PX, HALF_LINE * spacing))
+
+        def share(number: int) -> list[tuple[int, Any]]:
+            buffers, done = self._buffers[number], []
+            buffers.inside[:], buffers.around[:], buffers.covered[:] = 0, 0, 0
+            for view in range(number, len(self.canvas), len(self._buffers)):
+                count = self._draw(buffers, view, camera_T_parent, radius_m)
+                if compare is not None:
+                    done.append((view, compare(buffers, view, count)))
+                self._learn(buffers, view, count, reach)
+            return done
+
+        done = [row for rows in self._pool.map(share, range(len(self._buffers))) for row in rows]
+        self.renders += len(self.canvas)
+        self._covered = np.asarray(sum(buffers.covered for buffers in self._buffers), np.int16)
+        inside = np.sum([buffers.inside for buffers in self._buffers], 0)
+        around = np.sum([buffers.around for buffers in self._buffers], 0)
+        for counts, group, out in (
+            (inside, self._material, self._log_inside),
+            (around, self._one_group, self._log_around),
+        ):
+            kernels.likelihoods(counts, _GROUP_SHARE, group, _FEWEST_COUNTS, out, self._scratch)
+        self._mean_around = np.exp(self._log_around).mean(0)
+        return [result for _, result in sorted(done, key=lambda row: row[0])]
+
+    def _draw(self, buffers: _Buffers, view: int, camera_T_parent: Array, radius_m: float) -> int:
+        camera_T_link = camera_T_parent @ self.parent_T_link[view]
+        renderer = buffers.renderer
+        renderer.draw(camera_T_link)
+        flange = self.canvas.flange
+        centre = np.zeros(3) if flange is None else camera_T_link[flange, :3, 3]
+        seen = renderer.crossings
+        room = len(buffers.mean)
+        return int(
+            kernels.contour_points(
+                seen.pixels[:room],
+                seen.parts[:room],
+                seen.t[:room],
+                seen.slope[:room],
+                seen.point[:room],
+                seen.gradient[:room],
+                renderer.nearness,
+                centre,
+                radius_m if flange is not None else 0.0,
+                buffers.contour,
+                buffers.normal_rate,
+                buffers.parts,
+                buffers.kept,
+            )
+        )
+
+    def _learn(self, buffers: _Buffers, view: int, count: int, reach: int) -> None:
+        renderer, image = buffers.renderer, self._images[view]
+        kernels.mark_covered(renderer.face, renderer.box, buffers.covered)
+        kernels.count_inside(
+            renderer.face,
+            self.mesh.face_part,
+            renderer.box,
+            image,
+            self._valid,
+            self._background,
+            self._covered,
+            len(self.canvas),
+            buffers.inside,
+        )
+        kernels.count_around(
+            buffers.contour, buffers.parts, count, renderer.face, image, self._valid, reach, buffers.around
+        )
+
+    def _compared(
+        self, buffers: _Buffers, view: int, count: int, spacing: float, twists: Array
+    ) -> tuple[Array, Array, float, int, float, int]:
+        A, b = np.zeros((6 + len(twists),) * 2), np.zeros(6 + len(twists))
+        kernels.line_posteriors(
+            buffers.contour,
+            buffers.parts,
+            count,
+            buffers.renderer.face,
+            self.mesh.face_part,
+            self._images[view],
+            self._smooth[view],
+            self._valid,
+            self._log_inside,
+            self._log_around,
+            self._mean_around,
+            self._background,
+            self._agreement,
+            self._covered,
+            len(self.canvas),
+            HALF_LINE,
+            float(spacing),
+            buffers.mean,
+            buffers.variance,
+        )
+        seen = buffers.renderer.crossings
+        clip = _CLIP_SHARE * HALF_LINE * spacing
+        squares, used = kernels.add_points(
+            count,
+            buffers.normal_rate,
+            seen.point,
+            seen.link,
+            buffers.kept,
+            buffers.mean,
+            buffers.variance,
+            twists,
+            HALF_LINE,
+            float(spacing),
+            _LEAST_SIGMA_PX,
+            clip,
+            A,
+            b,
+        )
+        judged = buffers.variance[:count] >= 0
+        sharp = (
+            judged & (buffers.variance[:count] < _SHARP_PX**2) & (np.abs(buffers.mean[:count]) < _CENTRED_PX)
+        )
+        return A, b, squares, used, float(sharp.sum() / max(judged.sum(), 1)), int(judged.sum())
+
+
+@dataclass(frozen=True, eq=False)
+class Refined:
+    """Where a refinement ended, with the comparison there."""
+
+    camera_T_parent: Array
+    last: Round
+    iterations: int
+    converged: bool
+
+
+def refine(lines: Lines, camera_T_parent: Array, step: Step, radius_m: float = 0.0) -> Refined:
+    """Damped Gauss-Newton steps of limited length at one size."""
+    pose, converged, iteration = camera_T_parent, False, 0
+    lines.learn(pose, step.spacing)
+    found = lines(pose, step.spacing, radius_m=radius_m)
+    for iteration in range(1, step.rounds + 1):  # noqa: B007 the number of the last is told
+        if found.points < FEWEST_POINTS:
+            break
+        move = np.linalg.solve(found.A + np.diag(_DAMPING * np.diag(found.A) + 1e-9), found.b)
+        pose = se3.exp(limited(move)) @ pose
+        found = lines(pose, step.spacing, radius_m=radius_m)
+        converged = settled(found, move)
+        if converged:
+            break
+    return Refined(pose, found, iteration, converged)
+
+
+def settled(found: Round, move: Array) -> bool:
+    """Whether a move (6 + ...) is small against what the images can tell."""
+    return float(move @ found.A @ move) < CORRELATED_POINTS * _SETTLED**2
+
+
+def limited(move: NDArray[Any]) -> Array:
+    """The move (6 + ...) shortened until neither turn nor shift of the camera is too long to be believed."""
+    turn, shift = float(np.linalg.norm(move[:3])), float(np.linalg.norm(move[3:6]))
+    return np.asarray(move * min(1.0, _MOST_MOVE_RAD / max(turn, 1e-12), _MOST_MOVE_M / max(shift, 1e-12)))

@@ -1,0 +1,71 @@
+"""What the maskless method says about its answer: covariance, agreement of every photograph, the way it went."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hecbench import se3
+from hecbench.estimate import Estimate, Termination
+from hecbench_plugins.maskless.align import CORRELATED_POINTS, Refined, Round
+
+Array = NDArray[np.float64]
+
+_PRIOR_FREEDOM = 6.0
+
+
+def covariance(camera_T_parent: Array, last: Round, unknowns_A: Array) -> Array:
+    """(6, 6) of parent_T_camera's left perturbation.
+
+    Contour points are correlated along the contour and share what is wrong with their photograph, so the information
+    of the lines is divided by a factor: the mean of g' I^-1 g / 6 over the photographs, g the gradient that one
+    photograph alone leaves at the common end and I its own information (the scores' variance over their
+    expectation; Freedman 2006, "On the so-called Huber sandwich estimator"). With few photographs it stays near
+    `CORRELATED_POINTS`. What all photographs share (intrinsics, constant joint offsets) is not in it.
+    """
+    scores = [
+        gradient @ np.linalg.solve(information + 1e-9 * np.trace(information) * np.eye(6), gradient)
+        for information, gradient in zip(last.view_A[:, :6, :6], last.view_b[:, :6], strict=True)
+        if np.trace(information) > 0
+    ]
+    freedom = 6.0 * (len(scores) - 1)
+    factor = (_PRIOR_FREEDOM * CORRELATED_POINTS + sum(scores)) / (_PRIOR_FREEDOM + freedom)
+    seen_from_camera = factor * np.linalg.inv(unknowns_A)[:6, :6]
+    carried = se3.adjoint(se3.inverse(camera_T_parent))
+    found = carried @ seen_from_camera @ carried.T
+    return np.asarray((found + found.T) / 2)
+
+
+def answer(
+    end: Refined,
+    information: Array,
+    sample_ids: Sequence[str],
+    path: Sequence[tuple[str, Array]],
+    renders: int,
+    diagnostics: Mapping[str, Any],
+    extras: Mapping[str, Any],
+) -> Estimate:
+    """The estimate with its evidence."""
+    last = end.last
+    shares = {name: round(float(share), 3) for name, share in zip(sample_ids, last.view_sharp, strict=True)}
+    return Estimate(
+        se3.inverse(end.camera_T_parent),
+        covariance=covariance(end.camera_T_parent, last, information),
+        termination=Termination.CONVERGED if end.converged else Termination.MAX_ITERATIONS,
+        iterations=end.iterations,
+        renders=renders,
+        diagnostics={
+            "stage": "maskless",
+            **diagnostics,
+            "confirmed_at_end": last.sharp,
+            "confirmed_by_sample": shares,
+            "path": [
+                [stage, None, se3.log(se3.inverse(pose)).round(6).tolist()]
+                for stage, pose in [*path, ("last", end.camera_T_parent)]
+            ],
+        },
+        extras=extras,
+    )

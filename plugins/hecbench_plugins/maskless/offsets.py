@@ -1,0 +1,92 @@
+"""The last refinement with constant joint offsets as further unknowns, within a prior."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hecbench import se3
+from hecbench_plugins.maskless.align import (
+    CORRELATED_POINTS,
+    FEWEST_POINTS,
+    Lines,
+    Refined,
+    Round,
+    Step,
+    limited,
+    settled,
+)
+from hecbench_plugins.render_views import Kinematics
+
+Array = NDArray[np.float64]
+
+PRIOR_RAD = float(np.deg2rad(0.1))
+"""Standard deviation of an arm's constant joint offsets about the nominal model."""
+_UNSEEN = 0.8
+"""Share of the prior's standard deviation that must be left for an offset to count as not observable."""
+_STEP_RAD = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Offsets:
+    """Where the refinement ended with joint offsets, the information with the priors, and the offsets by joint."""
+
+    refined: Refined
+    information: Array
+    extras: dict[str, Any]
+
+
+def with_joint_offsets(
+    lines: Lines,
+    camera_T_parent: Array,
+    kinematics: Kinematics,
+    step: Step,
+    radius_m: float,
+) -> Offsets:
+    """Gauss-Newton over the camera and one offset per joint, the prior weighed as the correlated points it equals."""
+    joints = lines.canvas.joints_rad
+    offsets, pose, converged, iteration = np.zeros(joints.shape[1]), camera_T_parent, False, 0
+    weight = CORRELATED_POINTS / PRIOR_RAD**2
+    prior = np.r_[np.zeros(6), np.full(len(offsets), weight)]
+
+    def compare() -> Round:
+        lines.parent_T_link = np.stack([kinematics(row + offsets) for row in joints])
+        return lines(
+            pose, step.spacing, twists=_twists(kinematics, joints + offsets, pose), radius_m=radius_m
+        )
+
+    lines.learn(pose, step.spacing)
+    found = compare()
+    for iteration in range(1, 2 * step.rounds + 1):  # noqa: B007 the number of the last is told
+        if found.points < FEWEST_POINTS:
+            break
+        A = found.A + np.diag(prior)
+        b = found.b - prior * np.r_[np.zeros(6), offsets]
+        move = limited(np.linalg.solve(A + 1e-3 * np.diag(np.diag(found.A)) + 1e-9 * np.eye(len(A)), b))
+        pose, offsets = se3.exp(move[:6]) @ pose, offsets + move[6:]
+        found = compare()
+        converged = settled(found, move)
+        if converged:
+            break
+    information = found.A + np.diag(prior)
+    sigmas = np.sqrt(CORRELATED_POINTS * np.diag(np.linalg.inv(information))[6:])
+    extras = {
+        name: {"value": float(value), "sigma": float(sigma), "observable": bool(sigma < _UNSEEN * PRIOR_RAD)}
+        for name, value, sigma in zip(kinematics.joint_names, offsets, sigmas, strict=True)
+    }
+    return Offsets(Refined(pose, found, iteration, converged), information, extras)
+
+
+def _twists(kinematics: Kinematics, joints_rad: Array, camera_T_parent: Array) -> Sequence[Array]:
+    """Per view the left twists (J, L, 6) of the links in the camera frame per rad of every joint."""
+    steps = _STEP_RAD * np.eye(joints_rad.shape[1])
+    carried = se3.adjoint(camera_T_parent)
+    found = []
+    for row in joints_rad:
+        moved = [se3.log(kinematics(row + step) @ se3.inverse(kinematics(row - step))) for step in steps]
+        found.append(np.array(moved) / (2 * _STEP_RAD) @ carried.T)
+    return found

@@ -1,0 +1,261 @@
+"""Where the robot may be, at low resolution: which pixels changed, and which colours go with which materials.
+
+Two measures of a pose, neither with a prior of the robot's colours. Motion consistency, for a fixed camera and three
+views or more: pixels covered in some views must differ from the background there and nowhere else. Mutual information
+(Viola and Wells 1997) of the drawn material and the pixel's colour, less its bias (Miller 1955). Both are searched
+within the start's uncertainty by random draws and then CMA-ES (Hansen 2016, "The CMA evolution strategy: a tutorial")
+from the best draws that are far from each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hecbench import se3
+from hecbench.rendering import Renderer, RenderMesh
+from hecbench_plugins.maskless import kernels
+from hecbench_plugins.maskless.canvas import Canvas, shrunk_intrinsics
+
+Array = NDArray[np.float64]
+
+SEARCH_LEVEL = 8
+"""Of the meshes: pictures of WIDTH_PX show no more."""
+WIDTH_PX = 144
+_COLOURS = 32
+_LAB_WEIGHTS = (0.6, 1.6, 1.6)
+"""Of lightness and the two colour axes: a shadow changes the first most."""
+_KMEANS_PIXELS, _KMEANS_ROUNDS = 20000, 30
+_MOTION_WEIGHT = 4.0
+_PRIOR_WEIGHT, _BEYOND_WEIGHT, _LIMIT = 5.0, 3e3, 1.2
+_STILL = 0.3
+_REGION_POSES, _REGION_GROW_PX = 120, 9
+_DRAWS, _DRAWS_WITHOUT_MOTION = 1000, 3000
+_APART = 0.5
+_POPULATION, _GENERATIONS, _FIRST_SIGMA = 32, 40, 0.3
+
+
+@dataclass(frozen=True)
+class Ball:
+    """How far off the start may be: the camera's centre, m, and its rotation, rad."""
+
+    centre_m: float
+    turn_rad: float
+
+    def __str__(self) -> str:
+        return f"{self.centre_m:g} m and {np.rad2deg(self.turn_rad):.0f} deg"
+
+    @property
+    def scale(self) -> Array:
+        """(6,) of the coordinates of a pose in the ball."""
+        return np.array([self.centre_m] * 3 + [self.turn_rad] * 3)
+
+    def pose(self, start: Array, x: Array) -> Array:
+        """parent_T_camera (4, 4) whose centre is moved by x[:3] m in the parent's frame and that is turned by the
+        rotation vector x[3:] rad in its own.
+        """
+        return se3.make(start[:3, :3] @ se3.so3_exp(x[3:]), start[:3, 3] + x[:3])
+
+    def away(self, start: Array, pose: Array) -> tuple[float, float]:
+        """Distance and turn of a pose from the start, in radii."""
+        return (
+            float(se3.translation_error_m(start, pose)) / self.centre_m,
+            float(se3.rotation_error_rad(start, pose)) / self.turn_rad,
+        )
+
+    def draw(self, rng: np.random.Generator, count: int) -> Array:
+        """(count, 6) coordinates drawn in the ball and a tenth beyond."""
+        directions = rng.normal(size=(count, 2, 3))
+        directions /= np.linalg.norm(directions, axis=2, keepdims=True)
+        radii = 1.1 * np.sqrt(rng.random((count, 2, 1)))
+        return np.asarray((directions * radii).reshape(count, 6) * self.scale)
+
+
+class Score:
+    """The cost of poses, px-like per view; smaller is better. One renderer per view and thread."""
+
+    def __init__(
+        self,
+        mesh: RenderMesh,
+        canvas: Canvas,
+        foreground: NDArray[np.float32] | None,
+        threads: int,
+        rng: np.random.Generator,
+    ) -> None:
+        """`foreground` (N, H, W): how much each pixel of the canvas differs from the background, None if unknown."""
+        import cv2
+
+        height = round(WIDTH_PX * canvas.valid.shape[0] / canvas.valid.shape[1])
+        size = (WIDTH_PX, height)
+        factors = size[0] / canvas.valid.shape[1], size[1] / canvas.valid.shape[0]
+        self._size, self._canvas = size, canvas
+        self.evaluations = 0
+        self.has_motion = foreground is not None
+
+        def small(picture: NDArray[np.generic]) -> NDArray[np.float32]:
+            return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.float32)
+
+        self._valid = small(canvas.valid.astype(np.float32)) > 0.9
+        self._foreground = np.zeros((0, *self._valid.shape), np.float32)
+        if foreground is not None:
+            self._foreground = np.stack([small(view) for view in foreground])
+        self._still = (self._foreground.max(0, initial=0.0) < _STILL).astype(np.float32)
+        self._colour = _clustered([small(image) for image in canvas.images], self._valid, rng)
+        self._region = np.repeat(self._valid[None], len(canvas), 0)
+        _, material = np.unique(mesh.colours.round(3), axis=0, return_inverse=True)
+        self._materials = int(material.max()) + 1
+        self._face_material = material.reshape(-1)[mesh.face_part].astype(np.int32)
+        K = shrunk_intrinsics(canvas.K, *factors)
+        self._renderers = [Renderer(mesh, K, *size) for _ in range(threads)]
+        self._pool = ThreadPoolExecutor(threads)
+
+    def limit_region(self, camera_T_parents: Array) -> None:
+        """Count mutual information only where some of these poses (n, 4, 4) put the robot, and a little around it.
+
+        Without that limit it is best to fly the camera into the robot.
+        """
+        import cv2
+
+        for view, links in enumerate(self._canvas.parent_T_link):
+            seen = np.zeros(self._valid.shape, np.uint8)
+            for pose in camera_T_parents:
+                self._renderers[0].rasterise(pose @ links)
+                seen |= self._renderers[0].face >= 0
+            grown = cv2.dilate(seen, np.ones((_REGION_GROW_PX,) * 2, np.uint8))
+            self._region[view] = self._valid & (grown > 0)
+
+    def __call__(self, camera_T_parents: Array) -> Array:
+        """Costs (n,) of poses (n, 4, 4)."""
+        self.evaluations += len(camera_T_parents)
+        shares = np.array_split(np.asarray(camera_T_parents), len(self._renderers))
+        return np.concatenate(list(self._pool.map(self._costs, self._renderers, shares)))
+
+    def _costs(self, renderer: Renderer, poses: Array) -> Array:
+        views = len(self._canvas)
+        covered = np.zeros((views, *self._valid.shape), np.uint8)
+        counts = np.zeros((self._materials + 1, _COLOURS))
+        costs = np.zeros(len(poses))
+        for n, pose in enumerate(poses):
+            counts[:] = 0
+            covered[:] = 0
+            for view in range(views):
+                renderer.rasterise(pose @ self._canvas.parent_T_link[view])
+                kernels.mark_covered(renderer.face, renderer.box, covered[view])
+                kernels.count_materials(
+                    renderer.face, self._face_material, self._colour[view], self._region[view], counts
+                )
+            costs[n] = -mutual_information(counts) / views
+            if self.has_motion:
+                motion = kernels.motion_cost(covered, self._foreground, self._still, self._valid)
+                costs[n] += _MOTION_WEIGHT * motion
+        return costs
+
+
+def mutual_information(counts: Array) -> float:
+    """Of a table of counts (M, C), nats times count, less what independent draws would show on average."""
+    filled = counts + 1e-9
+    expected = filled.sum(1, keepdims=True) * filled.sum(0, keepdims=True) / filled.sum()
+    bias = 0.5 * (counts.shape[0] - 1) * (counts.shape[1] - 1)
+    return float((filled * np.log(filled / expected)).sum() - bias)
+
+
+def _clustered(
+    images: list[NDArray[np.float32]], valid: NDArray[np.bool_], rng: np.random.Generator
+) -> NDArray[np.int32]:
+    """The nearest of k-means' colours (N, h, w) for every pixel."""
+    import cv2
+
+    lab = [
+        cv2.cvtColor(image / np.float32(255), cv2.COLOR_RGB2LAB) * np.array(_LAB_WEIGHTS, np.float32)
+        for image in images
+    ]
+    pixels = np.concatenate([picture[valid] for picture in lab])
+    chosen = pixels[rng.permutation(len(pixels))[:_KMEANS_PIXELS]]
+    cv2.setRNGSeed(int(rng.integers(1 << 30)))
+    stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, _KMEANS_ROUNDS, 0.1)
+    _, _, centres = cv2.kmeans(chosen, _COLOURS, None, stop, 1, cv2.KMEANS_PP_CENTERS)
+    squares = (centres**2).sum(1)
+    nearest = [(squares - 2 * picture.reshape(-1, 3) @ centres.T).argmin(1) for picture in lab]
+    return np.stack(nearest).reshape(len(images), *valid.shape).astype(np.int32)
+
+
+def search(
+    score: Score, start: Array, ball: Ball, restarts: int, rng: np.random.Generator
+) -> Iterator[tuple[Array, float]]:
+    """The best parent_T_camera of each descent and its cost, descents from the best draws first."""
+    draws = _DRAWS if score.has_motion else _DRAWS_WITHOUT_MOTION
+    coordinates = np.concatenate([np.zeros((1, 6)), ball.draw(rng, draws)])
+
+    def poses(x: Array) -> Array:
+        return se3.inverse(np.stack([ball.pose(start, row) for row in x]))
+
+    def cost(x: Array) -> Array:
+        off = np.linalg.norm((x / ball.scale).reshape(-1, 2, 3), axis=2)
+        beyond = np.maximum(off - _LIMIT, 0).sum(1)
+        return np.asarray(score(poses(x)) + _PRIOR_WEIGHT * (off**2).sum(1) + _BEYOND_WEIGHT * beyond)
+
+    score.limit_region(poses(coordinates[:_REGION_POSES]))
+    order = cost(coordinates).argsort()
+    seeds: list[Array] = []
+    for x in coordinates[order]:
+        if len(seeds) == restarts:
+            break
+        if all(np.linalg.norm((x - seed) / ball.scale) > _APART for seed in seeds):
+            seeds.append(x)
+    for seed in seeds:
+        x, lowest = minimise(cost, seed, _FIRST_SIGMA * ball.scale, rng)
+        yield ball.pose(start, x), lowest
+
+
+def minimise(
+    cost: Callable[[Array], Array], start: Array, sigma: Array, rng: np.random.Generator
+) -> tuple[Array, float]:
+    """The lowest point (d,) that CMA-ES meets, and its cost; `cost` takes (n, d), `sigma` (d,) scales the axes.
+
+    Parameters as Hansen 2016, table 1, without negative weights.
+    """
+    d, n, parents = len(start), _POPULATION, _POPULATION // 2
+    weights = np.log(parents + 0.5) - np.log(np.arange(1, parents + 1))
+    weights /= weights.sum()
+    effective = 1 / (weights**2).sum()
+    keep_path = (4 + effective / d) / (d + 4 + 2 * effective / d)
+    keep_step = (effective + 2) / (d + effective + 5)
+    rank_one = 2 / ((d + 1.3) ** 2 + effective)
+    rank_many = min(1 - rank_one, 2 * (effective - 2 + 1 / effective) / ((d + 2) ** 2 + effective))
+    damping = 1 + 2 * max(0, np.sqrt((effective - 1) / (d + 1)) - 1) + keep_step
+    expected = np.sqrt(d) * (1 - 1 / (4 * d) + 1 / (21 * d * d))
+    mean, covariance, step = start.astype(float), np.eye(d), 1.0
+    path, step_path = np.zeros(d), np.zeros(d)
+    best, lowest = mean, np.inf
+    for generation in range(_GENERATIONS):
+        values, axes = np.linalg.eigh(covariance)
+        lengths = np.sqrt(np.maximum(values, 1e-20))
+        moves = rng.normal(size=(n, d)) * lengths @ axes.T
+        x = mean + step * moves * sigma
+        costs = cost(x)
+        order = costs.argsort()
+        if costs[order[0]] < lowest:
+            best, lowest = x[order[0]], float(costs[order[0]])
+        chosen = moves[order[:parents]]
+        move = weights @ chosen
+        mean = mean + step * move * sigma
+        whitened = axes @ ((axes.T @ move) / lengths)
+        step_path = (1 - keep_step) * step_path + np.sqrt(keep_step * (2 - keep_step) * effective) * whitened
+        length = np.linalg.norm(step_path)
+        settled = (
+            length / np.sqrt(1 - (1 - keep_step) ** (2 * (generation + 1))) < (1.4 + 2 / (d + 1)) * expected
+        )
+        path = (1 - keep_path) * path + settled * np.sqrt(keep_path * (2 - keep_path) * effective) * move
+        covariance = (
+            (1 - rank_one - rank_many) * covariance
+            + rank_one * np.outer(path, path)
+            + rank_many * (chosen.T * weights) @ chosen
+        )
+        step *= float(np.exp(keep_step / damping * (length / expected - 1)))
+        if step * lengths.max() < 1e-3:
+            break
+    return best, lowest

@@ -1,0 +1,185 @@
+"""Calibration from raw photographs: search within the start's uncertainty, refine, verify, and only then believe."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hecbench import se3
+from hecbench.errors import InputError, Refusal, SolverFailure
+from hecbench.estimate import Estimate
+from hecbench.recording import Mounting, Recording
+from hecbench.rendering import RenderMesh
+from hecbench_plugins import scene_background
+from hecbench_plugins.maskless import evidence
+from hecbench_plugins.maskless.align import Background, Lines, Refined, Step, refine, schedule
+from hecbench_plugins.maskless.canvas import Canvas, unfold
+from hecbench_plugins.maskless.offsets import with_joint_offsets
+from hecbench_plugins.maskless.search import SEARCH_LEVEL, Ball, Score, search
+from hecbench_plugins.render_views import Kinematics, moving_robot
+
+Array = NDArray[np.float64]
+
+NEAR, FAR = Ball(0.1, np.deg2rad(10)), Ball(0.2, np.deg2rad(20))
+"""How far off a start may be."""
+_SEARCH_VIEWS = 8
+_FEWEST_FOR_FAR = 3
+"""Views from which the larger ball is searched at once; fewer find the smaller one's end more surely."""
+_OUTSIDE = 1.4
+"""Radii of the ball beyond which an end is not believed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """Where a descent ended, and the share of its contour that the images confirm."""
+
+    camera_T_parent: Array
+    sharp: float
+    ball: Ball
+    path: tuple[tuple[str, Array], ...]
+    """Stage and camera_T_parent on the way there."""
+
+
+@dataclass(eq=False)
+class Photographs:
+    """All photographs of a recording, the few that are searched, and what is known of their background."""
+
+    kinematics: Kinematics
+    meshes: dict[int, RenderMesh]
+    canvas: Canvas
+    few: Canvas
+    background: Background | None
+    threads: int
+    renders: int = 0
+    descents: int = 0
+    _searched: dict[Step, Lines] = field(default_factory=dict)
+
+    @staticmethod
+    def of(recording: Recording, threads: int) -> Photographs:
+        """Read and undistort them.
+
+        Raises:
+            Refusal: no intrinsics, robot, joints or images; joints outside the limits.
+        """
+        try:
+            kinematics, meshes = moving_robot(recording)
+            canvas = unfold(recording, kinematics, threads)
+        except InputError as error:
+            raise Refusal(str(error)) from error
+        few = canvas.subset(np.unique(np.linspace(0, len(canvas) - 1, _SEARCH_VIEWS).round().astype(int)))
+        fixed = recording.mounting is Mounting.EYE_TO_HAND and len(canvas) >= scene_background.FEWEST_VIEWS
+        background = Background.of(canvas.images) if fixed else None
+        return Photographs(kinematics, meshes, canvas, few, background, threads)
+
+    def lines(self, step: Step, canvas: Canvas) -> Lines:
+        """The views of a canvas at the size of a step."""
+        background = self.background if step.background else None
+        return Lines(
+            self.meshes[min(step.level, max(self.meshes))], canvas, step.level, background, self.threads
+        )
+
+    def refined(self, camera_T_parent: Array) -> Refined:
+        """All steps but the last from a pose of the search, on the few."""
+        pose, found = camera_T_parent, None
+        for step in schedule(self.canvas.valid.shape[1])[0]:
+            lines = self._searched.get(step) or self._searched.setdefault(step, self.lines(step, self.few))
+            before = lines.renders
+            found = refine(lines, pose, step)
+            pose = found.camera_T_parent
+            self.renders += lines.renders - before
+        assert found is not None
+        return found
+
+
+@dataclass(frozen=True)
+class Maskless:
+    """The options of the method.
+
+    Attributes:
+        joints: solve for constant joint offsets too.
+        restarts: descents of the search in a ball before it is given up.
+        least_sharp: share of contour points that the images must confirm for an end to be believed.
+        tool_m: around the flange, where tools and targets hide the robot: left out at the last step.
+        threads: that share the views.
+    """
+
+    joints: bool = False
+    restarts: int = 6
+    least_sharp: float = 0.3
+    tool_m: float = 0.15
+    threads: int = len(os.sched_getaffinity(0))
+
+    def __call__(self, recording: Recording, *, rng: np.random.Generator) -> Estimate:
+        """Calibrate from the recording's start and its photographs alone."""
+        start = recording.initial_parent_T_camera
+        if start is None:
+            raise Refusal("a start is needed: initial_parent_T_camera, or --init FILE")
+        photographs = Photographs.of(recording, self.threads)
+        found = self._find(photographs, start, rng)
+        if found.sharp < self.least_sharp:
+            raise SolverFailure(
+                f"the photographs confirm {100 * found.sharp:.0f} % of the contour where the best of"
+                f" {photographs.descents} descents ended, {100 * self.least_sharp:.0f} % are needed: the start is"
+                f" farther off than {found.ball}, the joints or the robot are not those of the photographs, the"
+                " camera or the scene moved, or too little of the robot is seen; give more views or masks"
+            )
+        return self._finish(photographs, found)
+
+    def _find(self, photographs: Photographs, start: Array, rng: np.random.Generator) -> Candidate:
+        """The first end that the images confirm, or the best of all descents."""
+        foreground = None
+        if photographs.background is not None:
+            scene = photographs.background.image.astype(np.float32)
+            foreground = scene_background.foreground(photographs.few.images, scene)
+        score = Score(photographs.meshes[SEARCH_LEVEL], photographs.few, foreground, self.threads, rng)
+        best = Candidate(se3.inverse(start), -1.0, NEAR, ())
+        for ball in (FAR,) if len(photographs.canvas) >= _FEWEST_FOR_FAR else (NEAR, FAR):
+            for coarse, _ in search(score, start, ball, self.restarts, rng):
+                photographs.descents += 1
+                end = photographs.refined(se3.inverse(coarse))
+                within = max(ball.away(start, se3.inverse(end.camera_T_parent))) < _OUTSIDE
+                sharp = end.last.sharp if within else 0.0
+                if sharp > best.sharp:
+                    path = (("start", se3.inverse(start)), ("search", se3.inverse(coarse)))
+                    best = Candidate(end.camera_T_parent, sharp, ball, path)
+                if sharp >= self.least_sharp:
+                    break
+            if best.sharp >= self.least_sharp:
+                break
+        photographs.renders += score.evaluations * len(photographs.few)
+        return best
+
+    def _finish(self, photographs: Photographs, found: Candidate) -> Estimate:
+        """The last steps on all photographs, and the evidence."""
+        canvas = photographs.canvas
+        earlier, last = schedule(canvas.valid.shape[1])
+        pose, path = found.camera_T_parent, [*found.path, ("refined", found.camera_T_parent)]
+        if len(photographs.few) < len(canvas):
+            lines = photographs.lines(earlier[-1], canvas)
+            pose = refine(lines, pose, earlier[-1]).camera_T_parent
+            photographs.renders += lines.renders
+        lines = photographs.lines(last, canvas)
+        end = refine(lines, pose, last, self.tool_m)
+        information, extras = end.last.A, {}
+        if self.joints:
+            with_offsets = with_joint_offsets(
+                lines, end.camera_T_parent, photographs.kinematics, last, self.tool_m
+            )
+            end, information, extras = with_offsets.refined, with_offsets.information, with_offsets.extras
+        return evidence.answer(
+            end,
+            information,
+            canvas.sample_ids,
+            path,
+            photographs.renders + lines.renders,
+            {
+                "confirmed": found.sharp,
+                "descents": photographs.descents,
+                "background_known": photographs.background is not None,
+                "searched": str(found.ball),
+            },
+            extras,
+        )
