@@ -360,7 +360,7 @@ def refine(lines: Lines, camera_T_parent: Array, step: Step, radius_m: float = 0
     return Refined(pose, found, iteration, converged)
 
 
-def settled(found: Round, move: Array) -> bool:
+def settled(found: Round, move: NDArray[Any]) -> bool:
     """Whether a move (6 + ...) is small against what the images can tell."""
     return float(move @ found.A @ move) < CORRELATED_POINTS * _SETTLED**2
 

@@ -15,7 +15,7 @@ from hecbench.recording import Mounting, Recording
 from hecbench.rendering import RenderMesh
 from hecbench_plugins import scene_background
 from hecbench_plugins.maskless import evidence
-from hecbench_plugins.maskless.align import Background, Lines, Refined, Step, refine, schedule
+from hecbench_plugins.maskless.align import FEWEST_POINTS, Background, Lines, Refined, Step, refine, schedule
 from hecbench_plugins.maskless.canvas import Canvas, unfold
 from hecbench_plugins.maskless.offsets import with_joint_offsets
 from hecbench_plugins.maskless.search import SEARCH_LEVEL, Ball, Score, search
@@ -30,6 +30,9 @@ _FEWEST_FOR_FAR = 3
 """Views from which the larger ball is searched at once; fewer find the smaller one's end more surely."""
 _OUTSIDE = 1.4
 """Radii of the ball beyond which an end is not believed."""
+_TOOL_M = 0.15
+_TOOL_SHARE = 0.6
+"""Of the contour near the flange so much must be confirmed, against the rest, or something unknown is mounted there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,14 +105,12 @@ class Maskless:
         joints: solve for constant joint offsets too.
         restarts: descents of the search in a ball before it is given up.
         least_sharp: share of contour points that the images must confirm for an end to be believed.
-        tool_m: around the flange, where tools and targets hide the robot: left out at the last step.
         threads: that share the views.
     """
 
     joints: bool = False
     restarts: int = 6
     least_sharp: float = 0.3
-    tool_m: float = 0.15
     threads: int = len(os.sched_getaffinity(0))
 
     def __call__(self, recording: Recording, *, rng: np.random.Generator) -> Estimate:
@@ -162,11 +163,14 @@ class Maskless:
             pose = refine(lines, pose, earlier[-1]).camera_T_parent
             photographs.renders += lines.renders
         lines = photographs.lines(last, canvas)
-        end = refine(lines, pose, last, self.tool_m)
+        end = refine(lines, pose, last)
+        left_out_m = _TOOL_M if _carries_something(lines, end, last.spacing) else 0.0
+        if left_out_m:
+            end = refine(lines, end.camera_T_parent, last, left_out_m)
         information, extras = end.last.A, {}
         if self.joints:
             with_offsets = with_joint_offsets(
-                lines, end.camera_T_parent, photographs.kinematics, last, self.tool_m
+                lines, end.camera_T_parent, photographs.kinematics, last, left_out_m
             )
             end, information, extras = with_offsets.refined, with_offsets.information, with_offsets.extras
         return evidence.answer(
@@ -180,6 +184,18 @@ class Maskless:
                 "descents": photographs.descents,
                 "background_known": photographs.background is not None,
                 "searched": str(found.ball),
+                "left_out_around_flange_m": left_out_m,
             },
             extras,
         )
+
+
+def _carries_something(lines: Lines, end: Refined, spacing: float) -> bool:
+    """Whether the images confirm much less of the contour near the flange than elsewhere: a tool or target is there.
+
+    The sphere around the flange is then left out, as something that the model does not know.
+    """
+    whole, rest = end.last, lines(end.camera_T_parent, spacing, radius_m=_TOOL_M)
+    judged = whole.view_judged.sum() - rest.view_judged.sum()
+    confirmed = whole.view_sharp @ whole.view_judged - rest.view_sharp @ rest.view_judged
+    return bool(judged >= FEWEST_POINTS and confirmed < _TOOL_SHARE * rest.sharp * judged)
