@@ -21,7 +21,7 @@ from hecbench_plugins import render_evidence as evidence
 from hecbench_plugins import render_stages as stages
 from hecbench_plugins.render_intervals import between_pixels
 from hecbench_plugins.render_unknowns import ExtendedPhotometry, Unknown, solve
-from hecbench_plugins.render_views import Kinematics, View, linearised, prepare
+from hecbench_plugins.render_views import Kinematics, NoMask, View, linearised, prepare
 
 Array = NDArray[np.float64]
 
@@ -66,7 +66,10 @@ class RenderGN:
         """Calibrate from the recording's start."""
         if recording.initial_parent_T_camera is None:
             raise Refusal("render_gn needs a start: initial_parent_T_camera, or --init FILE")
-        kinematics, views = prepare(recording)
+        try:
+            kinematics, views = prepare(recording)
+        except NoMask:
+            return self._without_masks(recording, rng)
         start = se3.inverse(recording.initial_parent_T_camera)
         trace = stages.Trace()
         if any(self._camera_inside(view, start, trace) for view in views):
@@ -81,6 +84,13 @@ class RenderGN:
         return (
             replace(found, camera=_calibrated(recording.camera, found)) if "focal" in found.extras else found
         )
+
+    def _without_masks(self, recording: Recording, rng: np.random.Generator) -> Estimate:
+        from hecbench_plugins.maskless.solver import Maskless
+
+        if set(self.unknown) - {Unknown.JOINTS}:
+            raise Refusal("without masks only joint offsets can be solved for besides the camera: give masks")
+        return Maskless(joints=bool(self.unknown))(recording, rng=rng)
 
     def _extend(self, end: evidence.End, kinematics: Kinematics, trace: stages.Trace) -> evidence.End:
         """Solve for the other unknowns too, from where the camera alone ended."""

@@ -26,6 +26,10 @@ _BACKGROUND_SPREAD = 0.08
 _SMALLEST_HIDING_PX, _SOFT_EDGE_PX = 9, 2
 
 
+class NoMask(Refusal):
+    """An image without a mask whose background is too lively to tell the robot by it."""
+
+
 @lru_cache(maxsize=4)
 def robot_and_meshes(name: str | Path) -> tuple[RobotModel, dict[int, RenderMesh]]:
     """The model and its meshes by level; merged cells move no contour by more than a tenth of a level's pixel."""
@@ -112,6 +116,7 @@ def prepare(recording: Recording) -> tuple[Kinematics, list[View]]:
 
     Raises:
         Refusal: no intrinsics, robot, joints or pictures, or a mask without (or with nothing but) robot.
+        NoMask: an image without a mask and without a uniform background.
     """
     try:
         kinematics, meshes = moving_robot(recording)
@@ -223,7 +228,7 @@ def foreground(image: Picture, where: str) -> Picture:
     """A mask (H, W) in {0, 1} of what differs from a uniform background, found on a smoothed image.
 
     Raises:
-        Refusal: the border of the image is not uniform, so that only a given mask could tell the robot.
+        NoMask: the border of the image is not uniform, so that only a given mask could tell the robot.
     """
     from scipy import ndimage
 
@@ -235,7 +240,7 @@ def foreground(image: Picture, where: str) -> Picture:
     off = np.abs(smooth - background).max(-1)
     rim = np.concatenate([off[:8].ravel(), off[-8:].ravel()])
     if np.percentile(rim, 90) > _BACKGROUND_SPREAD:
-        raise Refusal(f"{where}: no mask, and the background is not uniform: give masks of the robot")
+        raise NoMask(f"{where}: no mask, and the background is not uniform: give masks of the robot")
     threshold = max(0.02, 3 * float(np.median(off) + np.std(rim)))
     mask = ndimage.binary_opening(ndimage.binary_fill_holes(off > threshold), iterations=2)
     return np.asarray(mask, np.float32)
