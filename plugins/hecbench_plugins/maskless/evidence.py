@@ -15,6 +15,8 @@ from hecbench_plugins.maskless.align import CORRELATED_POINTS, Refined, Round
 Array = NDArray[np.float64]
 
 _PRIOR_FREEDOM = 6.0
+_DOUBTFUL = 0.5
+"""Of the median share of confirmed contour: a photograph with less disagrees with the others."""
 
 
 def covariance(camera_T_parent: Array, last: Round, unknowns_A: Array) -> Array:
@@ -62,6 +64,9 @@ def answer(
             **diagnostics,
             "confirmed_at_end": last.sharp,
             "confirmed_by_sample": shares,
+            "doubtful_samples": [
+                name for name, share in shares.items() if share < _DOUBTFUL * np.median(last.view_sharp)
+            ],
             "path": [
                 [stage, None, se3.log(se3.inverse(pose)).round(6).tolist()]
                 for stage, pose in [*path, ("last", end.camera_T_parent)]
