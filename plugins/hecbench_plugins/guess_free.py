@@ -10,7 +10,7 @@ from the mask's area and centroid; and the best are refined by Gauss-Newton befo
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
 
@@ -252,7 +252,7 @@ class GuessFree:
     """
 
     sphere: ViewSphere = ViewSphere()
-    solver: RenderGN = RenderGN()
+    solver: RenderGN = field(default_factory=RenderGN)
     least_overlap: float = 0.5
     rival_margin: float = 0.04
     rival_apart: float = 0.15
