@@ -41,7 +41,9 @@ def by_background(recording: Recording) -> Recording:
         Refusal: the camera moves, there are too few images, or nothing moved before them.
     """
     if recording.mounting is not Mounting.EYE_TO_HAND:
-        raise Refusal(f"{recording.name}: the camera moves with the flange, so that no background stays: give masks")
+        raise Refusal(
+            f"{recording.name}: the camera moves with the flange, so that no background stays: give masks"
+        )
     samples = [i for i, source in enumerate(recording.images or ()) if source is not None]
     if len(samples) < FEWEST_VIEWS:
         raise Refusal(
@@ -60,7 +62,9 @@ def by_background(recording: Recording) -> Recording:
     else:
         found = [_cleaned(mask) for mask in unlike > _FOREGROUND]
     if not any(mask.any() for mask in found):
-        raise Refusal(f"{recording.name}: nothing moves between the images: no background can be told from the robot")
+        raise Refusal(
+            f"{recording.name}: nothing moves between the images: no background can be told from the robot"
+        )
     masks: list[NDArray[np.uint8] | None] = [None] * len(recording)
     for i, mask in zip(samples, found, strict=True):
         masks[i] = np.where(mask, np.uint8(255), np.uint8(0))

@@ -7,7 +7,7 @@ would draw the robot it may be; what is farther than that is background for sure
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +32,7 @@ class GrabCut:
         rounds: of GrabCut.
     """
 
-    uncertainty: Uncertainty = Uncertainty()
+    uncertainty: Uncertainty = field(default_factory=Uncertainty)
     rounds: int = 5
 
     def __call__(self, recording: Recording) -> Recording:
