@@ -83,7 +83,7 @@ def test_background_finds_what_moves_and_the_start_tells_what_stands(before_a_wa
 
 
 def test_background_drops_what_moves_far_from_the_robot(before_a_wall):
-    recording, masks = before_a_wall
+    recording, _ = before_a_wall
     images = [image.copy() for image in recording.images]
     images[2][:60, :60] = (255, 0, 255)
     disturbed = replace(recording, images=tuple(images))
