@@ -91,7 +91,7 @@ class RobotView:
         """What these joints (J,) would show to a camera."""
         links = self._model.link_poses(joints_rad, self._names, frame=self._parent)
         poses = se3.inverse(parent_T_camera) @ links
-        self._wide.draw(poses)
+        self._wide.rasterise(poses)
         drawn = self._wide.face >= 0
         height, width = drawn.shape
         top, left = (height - height // _CANVAS) // 2, (width - width // _CANVAS) // 2
@@ -107,7 +107,7 @@ class RobotView:
         parent_T_link = self._model.link_poses(joints_rad, self._names, frame=self._parent)
         found = np.empty((len(cameras), *self._small.face.shape), bool)
         for camera_T_parent, mask in zip(se3.inverse(cameras), found, strict=True):
-            self._small.draw(camera_T_parent @ parent_T_link)
+            self._small.rasterise(camera_T_parent @ parent_T_link)
             np.greater_equal(self._small.face, 0, out=mask)
         return found
 

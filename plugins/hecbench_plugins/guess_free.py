@@ -145,7 +145,7 @@ class MaskScore:
         self._areas = [int(mask.sum()) for mask in self._masks]
         self._distances = [signed_distance(mask) for mask in observed]
         self.rays = [
-            _ray(view.levels[_SIZE], *np.argwhere(mask).mean(0)[::-1])
+            _ray(view.levels[_SIZE].renderer, *np.argwhere(mask).mean(0)[::-1])
             for view, mask in zip(self.views, self._masks, strict=True)
         ]
         """(x, y, 1) through the masks' centroids."""
@@ -154,7 +154,7 @@ class MaskScore:
         """Mean intersection over union of the drawn robot and the masks."""
         values = []
         for view, mask, area in zip(self.views, self._masks, self._areas, strict=True):
-            renderer = stages.draw(view, _SIZE, camera_T_parent, self.trace).renderer
+            renderer = self._rasterised(view, camera_T_parent)
             drawn, shared = shared_pixels(renderer.face, mask, renderer.box)
             values.append(shared / (drawn + area - shared))
         return float(np.mean(values))
@@ -165,15 +165,21 @@ class MaskScore:
         for _ in range(_PLACING_ROUNDS):
             moves = []
             for view, ray, area in zip(self.views, self.rays, self._areas, strict=True):
-                at = stages.draw(view, _SIZE, pose, self.trace)
-                drawn, x, y, near = moments(at.renderer.face, at.renderer.nearness, at.renderer.box)
+                renderer = self._rasterised(view, pose)
+                drawn, x, y, near = moments(renderer.face, renderer.nearness, renderer.box)
                 if drawn >= _FEWEST_PIXELS:
                     ratio = np.clip(np.sqrt(drawn / area), 0.5, 2.0)
-                    moves.append((ray * ratio - _ray(at, x, y)) / near)
+                    moves.append((ray * ratio - _ray(renderer, x, y)) / near)
             if not moves:
                 break
             pose[:3, 3] += np.mean(moves, 0)
         return pose
+
+    def _rasterised(self, view: View, camera_T_parent: Array) -> Renderer:
+        renderer = view.levels[_SIZE].renderer
+        renderer.rasterise(camera_T_parent @ view.parent_T_link)
+        self.trace.renders += 1
+        return renderer
 
     def refined(self, camera_T_parent: Array, iterations: int) -> Array:
         """Some Gauss-Newton steps of the drawn contour towards the masks' contours."""
@@ -192,8 +198,8 @@ def _small(view: View, mesh: RenderMesh) -> View:
     return replace(view, levels={_SIZE: Level(renderer, observed, full.background, None)})
 
 
-def _ray(at: Level, x: float, y: float) -> Array:
-    K = np.asarray(at.renderer.K, float)
+def _ray(renderer: Renderer, x: float, y: float) -> Array:
+    K = np.asarray(renderer.K, float)
     return np.array([(x - K[0, 2]) / K[0, 0], (y - K[1, 2]) / K[1, 1], 1.0])
 
 

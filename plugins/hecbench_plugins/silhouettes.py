@@ -59,7 +59,7 @@ class Silhouettes:
 
     def draw(self, sample: int, parent_T_camera: Array) -> Mask:
         """Where (H, W) the robot is drawn for one sample; every call returns a new array."""
-        self._renderer.draw(se3.inverse(parent_T_camera) @ self._parent_T_link[sample])
+        self._renderer.rasterise(se3.inverse(parent_T_camera) @ self._parent_T_link[sample])
         drawn = self._renderer.face >= 0
         return drawn if self._source is None else np.asarray(drawn[self._source])
 
