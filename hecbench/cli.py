@@ -79,6 +79,9 @@ _unknown = click.option(
     multiple=True,
     help="Solve for this too, by every solver with the option `unknown`; repeatable.",
 )
+_segmenter = click.option(
+    "--segmenter", metavar="NAME", help="Whose masks of the robot are used; default: those of the recording."
+)
 _folder = click.Path(path_type=Path, file_okay=False)
 _file = click.Path(path_type=Path, dir_okay=False)
 _any_path = click.Path(path_type=Path)
@@ -98,7 +101,7 @@ def demo(out: Path, samples: int, seed: int) -> None:
     (out / store.FILE_NAME).unlink(missing_ok=True)
     levels = ("tag_2m", "small_tag_2m", "board_2m")
     tasks = planning.suite_tasks("markers", levels, samples, (), seed)
-    contents = _run(tasks, out, seed, jobs=os.cpu_count() or 1)
+    contents = _run(tasks, out, _options(seed), jobs=os.cpu_count() or 1)
     console.print_tables(contents.estimates)
     click.echo(f"report: {html.write(out).path}")
 
@@ -129,6 +132,7 @@ def plugins(kind: str | None, as_json: bool) -> None:
 @cli.command()
 @click.argument("recording", type=_any_path)
 @_solver
+@_segmenter
 @_unknown
 @click.option("--views", type=click.IntRange(min=1), help="Use this many samples, drawn with --seed.")
 @click.option("--init", type=_file, help="An estimate to start from instead of initial_parent_T_camera.")
@@ -143,6 +147,7 @@ def plugins(kind: str | None, as_json: bool) -> None:
 def solve(
     recording: Path,
     solvers: tuple[str, ...],
+    segmenter: str | None,
     unknown: tuple[str, ...],
     views: int | None,
     init: Path | None,
@@ -157,12 +162,13 @@ def solve(
     from hecbench.report.tables import Group, table
 
     loaded = planning.adjusted(runner.load_recording(recording), views, init, seed)
-    specs = planning.with_unknowns(planning.solvers_for(solvers, loaded), unknown)
+    specs = planning.with_unknowns(planning.solvers_for(solvers, loaded, segmenter), unknown)
     if not specs:
         raise HecbenchError(
             f"{recording}: no ready solver can use what it offers: {', '.join(sorted(loaded.offers()))}"
         )
-    estimates = best_first(runner.solve(loaded, specs, _options(seed, held_out), say=console.say))
+    options = _options(seed, held_out, segmenter)
+    estimates = best_first(runner.solve(loaded, specs, options, say=console.say))
     for estimate in estimates if out else ():
         estimate.save(Path(str(out)) / f"{estimate.solver}.json")
     if as_json:
@@ -178,6 +184,7 @@ def solve(
 @cli.command()
 @click.argument("sources", nargs=-1, required=True, metavar="SUITE|RECORDING...")
 @_solver
+@_segmenter
 @click.option(
     "--level", "levels", multiple=True, metavar="L", help="Level of the suite; repeatable; default: all."
 )
@@ -192,6 +199,7 @@ def solve(
 def run(
     sources: tuple[str, ...],
     solvers: tuple[str, ...],
+    segmenter: str | None,
     levels: tuple[str, ...],
     samples: int | None,
     held_out: bool | None,
@@ -207,9 +215,10 @@ def run(
 
     if jobs == 0:
         raise InputError("--jobs 0: give a number of processes, or -1 for one per core")
-    tasks = planning.tasks(sources, solvers, levels, samples, seed)
+    tasks = planning.tasks(sources, solvers, levels, samples, seed, segmenter)
     out = out or Path("out") / Path(sources[0]).name
-    contents = _run(tasks, out, seed, jobs=jobs, executor=executor, resume=resume, held_out=held_out)
+    options = _options(seed, held_out, segmenter)
+    contents = _run(tasks, out, options, jobs=jobs, executor=executor, resume=resume)
     for sentence in contents.damage:
         console.say(sentence)
     if as_json:
@@ -363,33 +372,31 @@ def export(estimate: Path, format_name: str, out: Path | None, **options: str | 
         click.echo(f"{out}: {exporter.summary}")
 
 
-def _options(seed: int, held_out: bool | None) -> Options:
+def _options(seed: int, held_out: bool | None = None, segmenter: str | None = None) -> Options:
     from hecbench.runner import Options
 
     words = ["hecbench", *(word for word in sys.argv[1:] if word != "--resume")]
-    return Options(seed=seed, held_out=held_out, command=shlex.join(words))
+    return Options(seed=seed, held_out=held_out, command=shlex.join(words), segmenter=segmenter)
 
 
 def _run(
     tasks: list[Task],
     out: Path,
-    seed: int,
+    options: Options,
     *,
     jobs: int,
     executor: str | None = None,
     resume: bool = False,
-    held_out: bool | None = None,
 ) -> Any:
     """Run tasks into a store under a progress bar on stderr."""
     from dataclasses import replace
 
     from hecbench import runner
 
-    options = replace(_options(seed, held_out), stop_on_bad_input=False)
     with console.progress(sum(len(task.solvers) for task in tasks)) as advance:
         return runner.run(
             tasks,
-            options,
+            replace(options, stop_on_bad_input=False),
             out=out,
             jobs=jobs,
             executor=executor,

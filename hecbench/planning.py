@@ -33,12 +33,16 @@ def adjusted(recording: Recording, views: int | None, init: Path | None, seed: i
     return recording
 
 
-def solvers_for(names: Sequence[str], recording: Recording) -> list[SolverSpec]:
-    """The named solvers, or all ready ones whose needs the recording will meet."""
+def solvers_for(names: Sequence[str], recording: Recording, segmenter: str | None = None) -> list[SolverSpec]:
+    """The named solvers, or all ready ones whose needs the recording will meet.
+
+    Raises:
+        InputError: no solver or segmenter is called so.
+    """
     known = registry.load()
     if names:
         return [known.get(Kind.SOLVER, name, SolverSpec) for name in dict.fromkeys(names)]
-    offers = runner.will_offer(recording)
+    offers = runner.will_offer(recording, segmenter)
     return [spec for spec in known.ready(Kind.SOLVER, SolverSpec) if spec.needs <= offers]
 
 
@@ -60,7 +64,12 @@ def with_unknowns(specs: Sequence[SolverSpec], unknown: Sequence[str]) -> list[S
 
 
 def tasks(
-    sources: Sequence[str], solvers: Sequence[str], levels: Sequence[str], samples: int | None, seed: int
+    sources: Sequence[str],
+    solvers: Sequence[str],
+    levels: Sequence[str],
+    samples: int | None,
+    seed: int,
+    segmenter: str | None = None,
 ) -> list[Task]:
     """The tasks of one suite, or of recordings by path.
 
@@ -69,20 +78,25 @@ def tasks(
     """
     suites = [spec.name for spec in registry.load().ready(Kind.SUITE, SuiteSpec)]
     if sources[0] in suites and len(sources) == 1:
-        return suite_tasks(sources[0], levels, samples, solvers, seed)
+        return suite_tasks(sources[0], levels, samples, solvers, seed, segmenter)
     if levels or samples is not None:
         raise InputError(f"--level and --samples are for a suite ({', '.join(suites)}), not for recordings")
     found = []
     for source in sources:
         if not Path(source).exists():
             raise InputError(f"{source}: is neither a suite ({', '.join(suites)}) nor a path that exists")
-        specs = solvers_for(solvers, runner.load_recording(Path(source)))
+        specs = solvers_for(solvers, runner.load_recording(Path(source)), segmenter)
         found.append(Task(tuple(spec.name for spec in specs), path=Path(source)))
     return found
 
 
 def suite_tasks(
-    name: str, levels: Sequence[str], samples: int | None, solvers: Sequence[str], seed: int
+    name: str,
+    levels: Sequence[str],
+    samples: int | None,
+    solvers: Sequence[str],
+    seed: int,
+    segmenter: str | None = None,
 ) -> list[Task]:
     """The tasks of a suite: each level's recordings with the solvers that its recordings can feed."""
     suite = registry.load().get(Kind.SUITE, name, SuiteSpec)
@@ -92,7 +106,7 @@ def suite_tasks(
     found = []
     for level in levels or suite.levels:
         meant = solvers or suite.solvers(level)
-        names = tuple(spec.name for spec in solvers_for(meant, suite.make(level, 0, seed)))
+        names = tuple(spec.name for spec in solvers_for(meant, suite.make(level, 0, seed), segmenter))
         indices = range(samples or suite.default_samples)
         found += [Task(names, suite=name, level=level, index=index) for index in indices]
     return found

@@ -21,7 +21,17 @@ from hecbench.estimate import Estimate, Status, Termination
 from hecbench.evidence import Evidence
 from hecbench.recording import Recording
 from hecbench.robot import flange_poses
-from hecbench.specs import DatasetSpec, EvaluatorSpec, Into, Kind, Need, ObserverSpec, SolverSpec, SuiteSpec
+from hecbench.specs import (
+    DatasetSpec,
+    EvaluatorSpec,
+    Into,
+    Kind,
+    Need,
+    ObserverSpec,
+    SegmenterSpec,
+    SolverSpec,
+    SuiteSpec,
+)
 
 _OBSERVED = (Need.CORNERS, Need.TARGET_POSES)
 _HOW_TO_GIVE = {
@@ -44,12 +54,14 @@ class Options:
         seed: of every random choice.
         held_out: whether to refit on folds; None: only without truth, and not for slow solvers.
         command: the command line, for the provenance.
+        segmenter: whose masks the solvers get; None: the recording's own, where it has some.
         stop_on_bad_input: raise when a solver finds a damaged image, instead of reporting it as a failure.
     """
 
     seed: int = 0
     held_out: bool | None = None
     command: str = ""
+    segmenter: str | None = None
     stop_on_bad_input: bool = True
 
 
@@ -88,9 +100,16 @@ def prepare(recording: Recording) -> Recording:
     return recording
 
 
-def will_offer(recording: Recording) -> frozenset[Need]:
-    """What the recording will offer once it is prepared, found without preparing it."""
+def will_offer(recording: Recording, segmenter: str | None = None) -> frozenset[Need]:
+    """What the recording will offer once it is prepared and has the segmenter's masks, found without either.
+
+    Raises:
+        InputError: no segmenter is called so.
+    """
     offers = recording.offers()
+    if segmenter is not None:
+        registry.load().get(Kind.SEGMENTER, segmenter, SegmenterSpec)
+        offers |= {Need.MASKS}
     observers = registry.load().ready(Kind.OBSERVER, ObserverSpec)
     given = {observer.gives for observer in observers if observer.applies(recording)}
     if Need.CORNERS in given:  # detection calibrates an unknown camera
@@ -120,22 +139,67 @@ def solve(
 
     `say` gets each note about how the recording was read and what was computed from it.
     """
-    prepared = prepare(recording)
-    for note in prepared.notes:
+    prepared = segmented(prepare(recording), options.segmenter)
+    for note in prepared.recording.notes:
         say(note)
     return _solve_prepared(prepared, specs, options, _provenance(recording, options))
 
 
+@dataclass(frozen=True)
+class Segmented:
+    """A recording with the masks of a segmenter.
+
+    Attributes:
+        recording: with these masks; without any when the segmenter refused.
+        refusal: why it did, or which image it could not read.
+        given_iou: mean intersection over union with the recording's own masks, where it has some.
+    """
+
+    recording: Recording
+    refusal: str | None = None
+    given_iou: float | None = None
+
+
+def segmented(recording: Recording, name: str | None) -> Segmented:
+    """Let a segmenter, which does not see the truth, make the masks; None leaves them as they are."""
+    if name is None:
+        return Segmented(recording)
+    segmenter = registry.load().get(Kind.SEGMENTER, name, SegmenterSpec)
+    try:
+        found = segmenter.factory()(recording.without_truth())
+    except (Refusal, InputError) as reason:
+        return Segmented(replace(recording, masks=None), f"segmenter '{name}': {reason}")
+    masked = replace(recording, masks=found.masks, notes=found.notes)
+    return Segmented(masked, given_iou=_mean_iou(masked, recording))
+
+
+def _mean_iou(recording: Recording, other: Recording) -> float | None:
+    """Of the masks that both have."""
+    pairs = zip(recording.masks or (), other.masks or (), strict=False)
+    both = [i for i, (mask, mask_of_other) in enumerate(pairs) if not (mask is None or mask_of_other is None)]
+    values = []
+    for i in both:
+        mask, mask_of_other = recording.mask(i), other.mask(i)
+        values.append((mask & mask_of_other).sum() / max((mask | mask_of_other).sum(), 1))
+    return float(np.mean(values)) if values else None
+
+
 def _solve_prepared(
-    recording: Recording, specs: Iterable[SolverSpec], options: Options, origin: dict[str, Any]
+    prepared: Segmented, specs: Iterable[SolverSpec], options: Options, origin: dict[str, Any]
 ) -> list[Estimate]:
-    blind = recording.without_truth()
-    return [
-        replace(
-            _measured(_solve_blind(blind, spec, options), recording, blind, spec, options), provenance=origin
-        )
-        for spec in specs
-    ]
+    recording, blind = prepared.recording, prepared.recording.without_truth()
+    estimates = []
+    for spec in specs:
+        if prepared.refusal is not None and Need.ROBOT_MODEL in spec.needs:
+            estimate = _unanswered(blind, spec, Status.REFUSED, prepared.refusal, 0.0)
+        else:
+            solved = _solve_blind(blind, spec, options)
+            estimate = _measured(solved, recording, blind, spec, options)
+        if prepared.given_iou is not None:
+            told = {**estimate.diagnostics, "masks_iou_given": prepared.given_iou}
+            estimate = replace(estimate, diagnostics=told)
+        estimates.append(replace(estimate, provenance=origin))
+    return estimates
 
 
 def _provenance(recording: Recording, options: Options) -> dict[str, Any]:
@@ -143,6 +207,7 @@ def _provenance(recording: Recording, options: Options) -> dict[str, Any]:
         "hecbench": __version__,
         "recording_sha256": recording.sha256,
         "seed": options.seed,
+        "masks": options.segmenter,
         "command": options.command,
         "versions": _versions(),
     }
@@ -258,12 +323,12 @@ def execute(task: Task, options: Options) -> tuple[list[Estimate], Evidence | No
     """Run one task, the unit of parallel work; a recording from disk is examined too, for the report."""
     specs = [registry.load().get(Kind.SOLVER, name, SolverSpec) for name in task.solvers]
     recording = task.recording(options.seed)
-    prepared = prepare(recording)
+    prepared = segmented(prepare(recording), options.segmenter)
     estimates = [
         replace(estimate, suite=task.suite or "files", level=task.level, item=task.item)
         for estimate in _solve_prepared(prepared, specs, options, _provenance(recording, options))
     ]
-    return estimates, None if task.path is None else _examined(recording, prepared)
+    return estimates, None if task.path is None else _examined(recording, prepared.recording)
 
 
 def _examined(recording: Recording, prepared: Recording) -> Evidence:
@@ -274,7 +339,7 @@ def _examined(recording: Recording, prepared: Recording) -> Evidence:
 
 
 def remaining(tasks: Iterable[Task], done: Iterable[Estimate], options: Options) -> list[Task]:
-    """The tasks without the solvers that already have a result of the same place, content and seed."""
+    """The tasks without the solvers that already have a result of the same place, content, seed and masks."""
     finished = {store.key(estimate)[:3] + store.key(estimate)[4:] for estimate in done}
     contents = {store.key(estimate)[3] for estimate in done}
 
@@ -282,7 +347,7 @@ def remaining(tasks: Iterable[Task], done: Iterable[Estimate], options: Options)
         place = task.suite or "files", task.level, task.item
         if task.path is not None and contents and load_recording(task.path).sha256 not in contents:
             return task.solvers
-        return tuple(s for s in task.solvers if (*place, s, options.seed) not in finished)
+        return tuple(s for s in task.solvers if (*place, s, options.seed, options.segmenter) not in finished)
 
     pruned = (replace(task, solvers=missing(task)) for task in tasks)
     return [task for task in pruned if task.solvers]

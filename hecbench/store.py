@@ -17,14 +17,15 @@ from hecbench.estimate import Estimate, decode
 
 FILE_NAME = "estimates.jsonl"
 
-Key = tuple[str | None, str | None, str | None, str, str, int | None]
+Key = tuple[str | None, str | None, str | None, str, str, int | None, str | None]
 
 
 def key(estimate: Estimate) -> Key:
-    """What makes a result the same result: suite, level, item, recording hash, solver, seed."""
+    """What makes a result the same result: suite, level, item, recording hash, solver, seed, segmenter."""
     provenance = estimate.provenance
     place = estimate.suite, estimate.level, estimate.item
-    return *place, str(provenance.get("recording_sha256")), estimate.solver, provenance.get("seed")
+    run = str(provenance.get("recording_sha256")), estimate.solver, provenance.get("seed")
+    return *place, *run, provenance.get("masks")
 
 
 @dataclass(frozen=True)

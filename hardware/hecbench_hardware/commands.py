@@ -45,8 +45,13 @@ def controller(host: str, model: str, time_scale: float) -> None:
 @click.option(
     "--set", "settings", multiple=True, metavar="DEVICE.NAME=VALUE", help="E.g. camera.folder=images."
 )
+@click.option("--poses", type=click.IntRange(min=3), help="Plan this many poses around the first sample.")
 @click.option(
-    "--poses", type=click.IntRange(min=3), help="Plan this many diverse poses around the first sample."
+    "--plan",
+    "criterion",
+    type=click.Choice(["diverse", "d_optimal", "mask_variance"]),
+    help="How --poses chooses: diverse poses of the target, or views in which the robot tells most about the camera. "
+    "Default: diverse, or d_optimal for a cell without a target.",
 )
 @click.option("--freedrive", is_flag=True, help="Guide the arm by hand instead of driving a plan.")
 @click.option(
@@ -66,6 +71,7 @@ def record(
     camera: str,
     settings: tuple[str, ...],
     poses: int | None,
+    criterion: str | None,
     freedrive: bool,
     frames: int,
     dry_run: bool,
@@ -86,6 +92,8 @@ def record(
 
     if freedrive and (poses is not None or dry_run):
         raise InputError("--freedrive has no plan: leave --poses and --dry-run out")
+    if criterion is not None and poses is None:
+        raise InputError(f"--plan {criterion}: say how many with --poses")
     plan = recording_io.load(cell)
     given = device_settings(settings)
     extra = {"host": host, "limits": None if limits is None else str(limits)}
@@ -102,7 +110,7 @@ def record(
             eye.follow(device)
         what = "guided by hand"
         if not freedrive:
-            plan, what = _checked(plan, device, out, poses, seed, dry_run)
+            plan, what = _checked(plan, device, out, poses, criterion, seed, dry_run)
             click.echo(f"{out}/plan.json: {what}", err=True)
             if dry_run:
                 return
@@ -147,13 +155,19 @@ def open_device(kind: Kind, name: str, options: Mapping[str, str]) -> Any:
 
 
 def _checked(
-    cell: Recording, robot: Robot, out: Path, poses: int | None, seed: int, dry_run: bool
+    cell: Recording,
+    robot: Robot,
+    out: Path,
+    poses: int | None,
+    criterion: str | None,
+    seed: int,
+    dry_run: bool,
 ) -> tuple[Recording, str]:
     """The plan, checked from where the arm stands, and what it amounts to in words."""
     import numpy as np
 
     from hecbench_hardware.recorder import plan as planning
-    from hecbench_hardware.recorder.poses import diverse_plan
+    from hecbench_hardware.recorder.poses import Criterion, diverse_plan, informative_plan
     from hecbench_hardware.recorder.session import PLAN_NAME
 
     if cell.robot and cell.robot.model not in (None, robot.arm.name):
@@ -161,7 +175,12 @@ def _checked(
             f"{cell.name} was made for a {cell.robot.model}, not a {robot.arm.name}: choose --robot"
         )
     if poses is not None:
-        cell = diverse_plan(cell, robot.arm, robot.limits, poses, np.random.default_rng(seed))
+        chosen_by = criterion or ("diverse" if cell.target else Criterion.D_OPTIMAL)
+        arguments = cell, robot.arm, robot.limits, poses, np.random.default_rng(seed)
+        if chosen_by == "diverse":
+            cell = diverse_plan(*arguments)
+        else:
+            cell = informative_plan(*arguments, criterion=Criterion(chosen_by))
     check = planning.dry_run if dry_run else planning.check_plan
     steps = check(robot.arm, cell, robot.state().joints_rad, robot.limits)
     planning.write_plan(steps, out / PLAN_NAME)

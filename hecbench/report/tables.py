@@ -44,12 +44,14 @@ class Group:
 
 
 def groups(estimates: Iterable[Estimate]) -> list[Group]:
-    """One group per level of each suite and per recording given by path."""
+    """One group per level of each suite and per recording given by path, and of these per segmenter."""
 
     def place(estimate: Estimate) -> tuple[str, str]:
+        segmenter = estimate.provenance.get("masks")
+        masks = f", masks: {segmenter}" if segmenter else ""
         if estimate.level is not None:
-            return f"{estimate.suite}: {estimate.level}", "level"
-        return f"{estimate.recording} ({estimate.item})", "item"
+            return f"{estimate.suite}: {estimate.level}{masks}", "level"
+        return f"{estimate.recording} ({estimate.item}){masks}", "item"
 
     ordered = sorted(estimates, key=place)
     return [
@@ -130,6 +132,10 @@ def _recording_table(title: str, estimates: Sequence[Estimate]) -> Table:
         ("held-out mm [95 %]", lambda e: _held_out(e, "target_mm")),
         ("median mm", lambda e: _number((e.held_out or {}).get("target_mm_median"))),
         ("held-out deg", lambda e: _number((e.held_out or {}).get("target_deg"))),
+        ("held-out mask IoU [95 %]", lambda e: _held_out(e, "mask_iou")),
+        ("mask IoU", lambda e: _number(e.diagnostics.get("mask_iou"))),
+        ("masks IoU with given", lambda e: _number(e.diagnostics.get("masks_iou_given"))),
+        ("masks IoU with truth", lambda e: _number((e.errors or {}).get("masks_iou_truth"))),
         ("spread deg", lambda e: _number(e.diagnostics.get("target_spread_deg"))),
         ("spread mm", lambda e: _number(e.diagnostics.get("target_spread_mm"))),
         ("TRE mm", lambda e: _number((e.errors or {}).get("tre_mm"))),

@@ -6,5 +6,6 @@ plugin_modules = (
     *submodules(__name__, "solvers"),
     *submodules(__name__, "observers"),
     *submodules(__name__, "evaluators"),
+    *submodules(__name__, "segmenters"),
 )
 """Modules whose hooks belong to this package, imported one by one when plugins are listed."""

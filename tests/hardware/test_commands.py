@@ -78,6 +78,33 @@ def test_dry_run_writes_the_plan_and_nothing_else(invoke, cell, tmp_path):
     assert [path.name for path in out.iterdir()] == ["plan.json"]
 
 
+def test_a_cell_without_a_target_gets_views_of_the_robot(invoke, cell, tmp_path):
+    with_target = recording_io.load(cell)
+    base_T_flange = with_target.base_T_flange[0]
+    eye = np.array([-1.6, -1.2, 0.6])
+    forward = (base_T_flange[:3, 3] / 2 - eye) / np.linalg.norm(base_T_flange[:3, 3] / 2 - eye)
+    right = np.cross(forward, [0, 0, 1]) / np.linalg.norm(np.cross(forward, [0, 0, 1]))
+    markerless = Recording(
+        name="markerless",
+        mounting=Mounting.EYE_TO_HAND,
+        sample_ids=("0",),
+        robot=with_target.robot,
+        camera=with_target.camera,
+        initial_parent_T_camera=se3.make(np.stack([right, np.cross(forward, right), forward], 1), eye),
+        joints_rad=with_target.joints_rad[:1],
+    )
+    recording_io.save(markerless, tmp_path / "markerless")
+    out = tmp_path / "out"
+    result = invoke(tmp_path / "markerless", "--out", out, *FAST, "--poses", 3, "--dry-run")
+    assert result.exit_code == 0
+    assert json.loads((out / "plan.json").read_text())["motions"] == 3
+
+
+def test_a_criterion_needs_a_number_of_poses(invoke, cell, tmp_path):
+    with pytest.raises(InputError, match="say how many with --poses"):
+        invoke(cell, "--out", tmp_path / "out", "--plan", "d_optimal")
+
+
 def test_freedrive_on_a_simulated_arm(invoke, cell, tmp_path):
     result = invoke(cell, "--out", tmp_path / "out", *FAST, "--freedrive", input="\nq\n")
     assert "1 samples" in result.stdout

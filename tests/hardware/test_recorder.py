@@ -11,13 +11,14 @@ from hecbench_hardware.devices import DeviceFault, Fault
 from hecbench_hardware.kinematics import ARMS
 from hecbench_hardware.limits import Box, Limits, check_path, joint_path
 from hecbench_hardware.recorder.plan import check_plan, dry_run, write_plan
-from hecbench_hardware.recorder.poses import View, diverse_plan
+from hecbench_hardware.recorder.poses import Criterion, View, diverse_plan, informative_plan
 from hecbench_hardware.recorder.record import Recorder
 from hecbench_hardware.recorder.session import FILE_NAME
 from PIL import Image
 
 from hecbench import recording_io, se3
 from hecbench.errors import HecbenchError, InputError
+from hecbench.next_view import RobotView
 from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
 from hecbench.targets import AprilTagTarget
 
@@ -234,3 +235,49 @@ def test_diverse_plan_refuses_what_cannot_be_reached(cell, ready_pose):
     tight = Limits(workspace=Box(tuple(flange - 0.2), tuple(flange + 0.2)))
     with pytest.raises(InputError, match="of 40 poses"):
         diverse_plan(cell, ARM, tight, 40, np.random.default_rng(0))
+
+
+@pytest.fixture
+def markerless(ready_pose):
+    """A camera 1.8 m before the arm that sees all of it, and no target."""
+    eye, aim = np.array([-1.6, -1.2, 0.6]), np.array([-0.2, -0.1, 0.35])
+    forward = (aim - eye) / np.linalg.norm(aim - eye)
+    right = np.cross(forward, [0, 0, 1]) / np.linalg.norm(np.cross(forward, [0, 0, 1]))
+    rotation = np.stack([right, np.cross(forward, right), forward], 1)
+    return Recording(
+        name="markerless",
+        mounting=Mounting.EYE_TO_HAND,
+        sample_ids=("seed",),
+        robot=RobotDescription(model="ur5e"),
+        camera=CameraModel(640, 480, K),
+        initial_parent_T_camera=se3.make(rotation, eye),
+        joints_rad=ready_pose[None],
+    )
+
+
+@pytest.mark.parametrize("criterion", list(Criterion))
+def test_informative_plan(markerless, ready_pose, criterion):
+    limits = Limits()
+    planned = informative_plan(markerless, ARM, limits, 5, np.random.default_rng(0), criterion)
+    again = informative_plan(markerless, ARM, limits, 5, np.random.default_rng(0), criterion)
+    assert np.array_equal(planned.joints_rad, again.joints_rad)
+    assert np.array_equal(planned.joints_rad[0], ready_pose)
+    assert len(planned) == 5
+    for start, end in zip(planned.joints_rad, planned.joints_rad[1:], strict=False):
+        check_path(ARM, joint_path(start, end), limits)
+    view = RobotView(markerless)
+    for joints in planned.joints_rad[1:]:
+        assert view.look(joints, markerless.initial_parent_T_camera).in_view >= 0.6
+
+
+@pytest.mark.parametrize("missing", ["camera", "robot", "initial_parent_T_camera"])
+def test_informative_plan_says_what_the_cell_lacks(markerless, missing):
+    with pytest.raises(InputError, match=missing):
+        informative_plan(replace(markerless, **{missing: None}), ARM, Limits(), 5, np.random.default_rng(0))
+
+
+def test_informative_plan_refuses_what_cannot_be_reached(markerless, ready_pose):
+    flange = ARM.forward(ready_pose)[:3, 3]
+    tight = Limits(workspace=Box(tuple(flange - 0.19), tuple(flange + 0.19)))
+    with pytest.raises(InputError, match="of 40 poses can be reached"):
+        informative_plan(markerless, ARM, tight, 40, np.random.default_rng(0))

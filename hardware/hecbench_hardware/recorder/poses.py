@@ -1,16 +1,18 @@
-"""Poses worth recording: the target in view, within the limits, and turned about as many axes as possible.
+"""Poses worth recording: the target or the robot in view, within the limits, and telling as much as possible.
 
-Hand-eye calibration needs rotations about different axes (Tsai and Lenz 1989, section on accuracy), so
-candidates are drawn in the camera's view and chosen one by one, each the furthest from those already chosen.
+With a target: hand-eye calibration needs rotations about different axes (Tsai and Lenz 1989, section on accuracy), so
+candidates are drawn in the camera's view and chosen one by one, each the furthest from those already chosen. Without
+one the robot's contour tells the camera (`hecbench.next_view`), and candidates are joints around the first sample's.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from enum import StrEnum
 
 import numpy as np
 
-from hecbench import se3
+from hecbench import next_view, se3
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel, Mounting, Recording
 from hecbench.se3 import Array
@@ -23,6 +25,18 @@ _METRES_PER_RADIAN = 0.5
 """How far apart in position counts as much as one radian of rotation when poses are compared."""
 _MARGIN = 0.05
 """Share of the image at each edge that the target keeps clear of."""
+
+
+_LOOKS = 300
+_WANDER_RAD = np.array([1.5, 0.6, 0.6, 1.2, 1.2, 3.0])
+"""How far candidates for views of the robot go from the first sample's joints."""
+
+
+class Criterion(StrEnum):
+    """What makes a view of the robot worth recording; see `hecbench.next_view`."""
+
+    D_OPTIMAL = "d_optimal"
+    MASK_VARIANCE = "mask_variance"
 
 
 @dataclass(frozen=True)
@@ -78,7 +92,68 @@ def diverse_plan(
             break
         if _free_path(arm, start, joints[pick], limits):
             chosen.append(joints[pick])
-    ordered = _short_tour(np.array(chosen), arm, limits)
+    return _toured(cell, np.array(chosen), arm, limits, count)
+
+
+def informative_plan(
+    cell: Recording,
+    arm: UrArm,
+    limits: Limits,
+    count: int,
+    rng: np.random.Generator,
+    criterion: Criterion = Criterion.D_OPTIMAL,
+) -> Recording:
+    """A plan of `count` poses in which the robot itself tells most about the camera, for cells without a target.
+
+    Candidates are joints drawn evenly around the first sample's, no further than `_WANDER_RAD`: self-collision is not
+    modelled, and an arm that is folded as at the start stays clear of itself.
+
+    Args:
+        cell: Describes robot model, camera and mounting, holds a rough `initial_parent_T_camera`, and in its first
+            sample joints at which the camera sees the robot.
+        arm: The arm.
+        limits: Every pose and every path between two poses respects them.
+        count: How many poses.
+        rng: Draws the candidates.
+        criterion: What makes a pose worth recording.
+
+    Returns:
+        The cell with the planned joints and poses as its samples, in driving order, the first sample first.
+
+    Raises:
+        InputError: The cell lacks something, or fewer than `count` poses can be reached and seen.
+    """
+    for name, value in (
+        ("initial_parent_T_camera", cell.initial_parent_T_camera),
+        ("samples[0].joints_rad", cell.joints_rad),
+    ):
+        if value is None:
+            raise InputError(
+                f"{cell.name}: planning views of the robot needs {name}, roughly; add it to the cell"
+            )
+    assert cell.joints_rad is not None
+    assert cell.initial_parent_T_camera is not None
+    view, start = next_view.RobotView(cell), bounds.six_joints(cell.joints_rad[0])
+    drawn = start + rng.uniform(-1, 1, (_LOOKS, 6)) * _WANDER_RAD
+    free = [joints for joints in drawn if _free_path(arm, start, joints, limits)]
+    if len(free) < count:
+        raise InputError(
+            f"{cell.name}: only {len(free)} of {count} poses can be reached within the limits: ask for fewer, widen"
+            " the limits, or start from another pose"
+        )
+    camera = cell.initial_parent_T_camera
+    known = next_view.prior_information() + view.look(start, camera).information
+    arguments = view, camera, np.array(free), known, count - 1
+    if criterion is Criterion.D_OPTIMAL:
+        chosen = next_view.most_informative(*arguments)
+    else:
+        chosen = next_view.most_uncertain(*arguments, rng=rng)
+    return _toured(cell, np.vstack([start, chosen.joints_rad]), arm, limits, count)
+
+
+def _toured(cell: Recording, chosen: Array, arm: UrArm, limits: Limits, count: int) -> Recording:
+    """The cell with these joints (N, 6) as its samples, in driving order."""
+    ordered = _short_tour(chosen, arm, limits)
     if len(ordered) < count:
         raise InputError(
             f"{cell.name}: only {len(ordered)} of {count} poses can be reached and seen within the limits:"

@@ -1,0 +1,138 @@
+"""Overlap of the drawn robot with the masks: of an answer, of predictions of left-out views, and of the masks at the
+truth.
+
+An intersection over union is never a distance: how many millimetres it stands for depends on the view.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hecbench import statistics
+from hecbench.estimate import Estimate, Status
+from hecbench.recording import Recording
+from hecbench.registry import hookimpl
+from hecbench.specs import Column, EvaluatorSpec, Into, Need
+from hecbench_plugins.silhouettes import Silhouettes
+
+Array = NDArray[np.float64]
+
+FOLDS = 5
+_NEEDS = frozenset({Need.MASKS, Need.ROBOT_MODEL, Need.JOINTS, Need.INTRINSICS})
+
+
+def overlaps(recording: Recording, parent_T_camera: Array, samples: Sequence[int]) -> list[float]:
+    """Intersection over union of the robot drawn at a pose and the masks of these samples."""
+    silhouettes = Silhouettes(recording)
+    found = []
+    for sample in samples:
+        drawn, mask = silhouettes.draw(sample, parent_T_camera), recording.mask(sample)
+        found.append(float((drawn & mask).sum() / max((drawn | mask).sum(), 1)))
+    return found
+
+
+def masked_samples(recording: Recording) -> list[int]:
+    """The samples with joints and a mask."""
+    assert recording.masks is not None
+    assert recording.joints_rad is not None
+    has_joints = np.atleast_1d(np.isfinite(recording.joints_rad).all(1))
+    return [i for i, mask in enumerate(recording.masks) if mask is not None and has_joints[i]]
+
+
+def of_answer(
+    estimate: Estimate,
+    recording: Recording,
+    *,
+    solve: Callable[[Recording], Estimate],
+    rng: np.random.Generator,
+) -> Mapping[str, float]:
+    """The robot drawn at the estimate against the masks that the solver got: mean and least over the samples."""
+    assert estimate.parent_T_camera is not None
+    found = overlaps(recording, estimate.parent_T_camera, masked_samples(recording))
+    return {"mask_iou": float(np.mean(found)), "mask_iou_least": min(found)}
+
+
+def of_left_out_views(
+    estimate: Estimate,
+    recording: Recording,
+    *,
+    solve: Callable[[Recording], Estimate],
+    rng: np.random.Generator,
+) -> Mapping[str, Any]:
+    """The robot drawn in left-out views at the pose solved from the others, 5-fold: mean, its interval, median.
+
+    A fold on which the solver gives no answer is counted in `failed_folds` and predicts nothing.
+    """
+    usable = masked_samples(recording)
+    found: list[float] = []
+    failed = 0
+    folds = np.array_split(rng.permutation(usable), min(FOLDS, len(usable)))
+    for fold in folds:
+        training = [i for i in usable if i not in fold]
+        fitted = solve(recording.subset(training))
+        if fitted.status is not Status.OK:
+            failed += 1
+            continue
+        assert fitted.parent_T_camera is not None
+        found += overlaps(recording, fitted.parent_T_camera, fold.tolist())
+    counts: dict[str, Any] = {"folds": len(folds), "failed_folds": failed, "samples": len(found)}
+    if not found:
+        return counts
+    mean = statistics.bootstrap(found, np.mean)
+    return counts | {
+        "mask_iou": mean.value,
+        "mask_iou_interval": [mean.low, mean.high],
+        "mask_iou_median": float(np.median(found)),
+    }
+
+
+def of_masks(
+    estimate: Estimate,
+    recording: Recording,
+    *,
+    solve: Callable[[Recording], Estimate],
+    rng: np.random.Generator,
+) -> Mapping[str, float]:
+    """The masks against the robot drawn at the truth: mean over the samples. Says nothing of the estimate."""
+    assert recording.truth_parent_T_camera is not None
+    found = overlaps(recording, recording.truth_parent_T_camera, masked_samples(recording))
+    return {"masks_iou_truth": float(np.mean(found))}
+
+
+def _drawable(recording: Recording) -> bool:
+    return recording.offers() >= _NEEDS and bool(masked_samples(recording))
+
+
+@hookimpl
+def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
+    """This file's rulers."""
+    yield EvaluatorSpec(
+        name="mask_iou",
+        summary="overlap of the robot drawn at the answer with the masks",
+        columns=(Column("mask_iou", "", False), Column("mask_iou_least", "", False)),
+        factory=lambda: of_answer,
+        into=Into.DIAGNOSTICS,
+        applies=_drawable,
+    )
+    yield EvaluatorSpec(
+        name="mask_iou_held_out",
+        summary="overlap of the robot drawn in left-out views with their masks, where there is no target",
+        columns=(Column("mask_iou", "", False),),
+        factory=lambda: of_left_out_views,
+        into=Into.HELD_OUT,
+        applies=lambda recording: (
+            recording.camera_T_target is None and _drawable(recording) and len(masked_samples(recording)) > 1
+        ),
+    )
+    yield EvaluatorSpec(
+        name="masks_iou_truth",
+        summary="overlap of the masks with the robot drawn at the true camera pose",
+        columns=(Column("masks_iou_truth", "", False),),
+        factory=lambda: of_masks,
+        into=Into.ERRORS,
+        applies=lambda recording: recording.truth_parent_T_camera is not None and _drawable(recording),
+    )
