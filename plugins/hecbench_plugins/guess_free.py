@@ -22,11 +22,13 @@ from hecbench.errors import Refusal, SolverFailure
 from hecbench.estimate import Estimate
 from hecbench.recording import Mounting, Recording
 from hecbench.rendering import Renderer, RenderMesh
+from hecbench.specs import Need
 from hecbench_plugins import render_stages as stages
 from hecbench_plugins.guess_free_kernels import moments, shared_pixels
 from hecbench_plugins.render_gn import RenderGN
 from hecbench_plugins.render_views import (
     Level,
+    NoMask,
     View,
     prepare,
     robot_and_meshes,
@@ -51,6 +53,7 @@ _FIRST_ROUND = (150, 6)
 """How many of the best are refined, and in how many steps, round by round; the first by the scanned views alone."""
 _APART = 0.05
 _FEWEST_PIXELS = 8
+_SPACING_WITHOUT_MASKS_DEG = 15.0
 
 
 @dataclass(frozen=True)
@@ -273,6 +276,16 @@ class GuessFree:
             raise Refusal(
                 "a start is searched for fixed cameras only: give initial_parent_T_camera, or --init FILE"
             )
+        try:
+            return self._by_masks(recording, rng)
+        except NoMask:
+            return self._without_masks(recording, rng)
+        except SolverFailure:
+            if Need.MASKS in recording.offers():
+                raise
+            return self._without_masks(recording, rng)
+
+    def _by_masks(self, recording: Recording, rng: np.random.Generator) -> Estimate:
         _, views = prepare(recording)
         robot = recording.robot
         assert robot is not None
@@ -297,6 +310,11 @@ class GuessFree:
             iterations=best.iterations + trace.iterations,
             diagnostics={**best.diagnostics, **searched},
         )
+
+    def _without_masks(self, recording: Recording, rng: np.random.Generator) -> Estimate:
+        from hecbench_plugins.maskless.solver import Maskless
+
+        return Maskless(free=replace(self.sphere, spacing_deg=_SPACING_WITHOUT_MASKS_DEG))(recording, rng=rng)
 
     def _rivals(self, found: Sequence[Start]) -> list[Start]:
         near = [start for start in found if start.overlap >= found[0].overlap - self.rival_margin]

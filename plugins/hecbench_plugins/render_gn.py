@@ -17,6 +17,7 @@ from hecbench import se3
 from hecbench.errors import Refusal, SolverFailure
 from hecbench.estimate import Estimate, Termination
 from hecbench.recording import CameraModel, Recording
+from hecbench.specs import Need
 from hecbench_plugins import render_evidence as evidence
 from hecbench_plugins import render_stages as stages
 from hecbench_plugins.render_intervals import between_pixels
@@ -67,9 +68,18 @@ class RenderGN:
         if recording.initial_parent_T_camera is None:
             raise Refusal("render_gn needs a start: initial_parent_T_camera, or --init FILE")
         try:
-            kinematics, views = prepare(recording)
+            return self._by_masks(recording)
         except NoMask:
             return self._without_masks(recording, rng)
+        except SolverFailure:
+            if Need.MASKS in recording.offers():
+                raise
+            return self._without_masks(recording, rng)
+
+    def _by_masks(self, recording: Recording) -> Estimate:
+        """From given masks, or from those that a uniform background gives."""
+        assert recording.initial_parent_T_camera is not None
+        kinematics, views = prepare(recording)
         start = se3.inverse(recording.initial_parent_T_camera)
         trace = stages.Trace()
         if any(self._camera_inside(view, start, trace) for view in views):

@@ -14,9 +14,11 @@ from hecbench.estimate import Estimate
 from hecbench.recording import Mounting, Recording
 from hecbench.rendering import RenderMesh
 from hecbench_plugins import scene_background
+from hecbench_plugins.guess_free import ViewSphere
 from hecbench_plugins.maskless import evidence
 from hecbench_plugins.maskless.align import FEWEST_POINTS, Background, Lines, Refined, Step, refine, schedule
 from hecbench_plugins.maskless.canvas import Canvas, unfold
+from hecbench_plugins.maskless.free import starts
 from hecbench_plugins.maskless.offsets import with_joint_offsets
 from hecbench_plugins.maskless.search import SEARCH_LEVEL, Ball, Score, search
 from hecbench_plugins.render_views import Kinematics, moving_robot
@@ -30,9 +32,23 @@ _FEWEST_FOR_FAR = 3
 """Views from which the larger ball is searched at once; fewer find the smaller one's end more surely."""
 _OUTSIDE = 1.4
 """Radii of the ball beyond which an end is not believed."""
+_FREE_BALL, _FREE_STARTS = Ball(0.35, np.deg2rad(18)), 6
+"""What the lattice of a search without a start leaves open about each of its starts, and how many are followed."""
 _TOOL_M = 0.15
 _TOOL_SHARE = 0.6
 """Of the contour near the flange so much must be confirmed, against the rest, or something unknown is mounted there."""
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Where to search: about which parent_T_camera (4, 4), how far, and with how many descents."""
+
+    start: Array
+    ball: Ball
+    restarts: int
+
+    def __str__(self) -> str:
+        return f"{self.ball} from {np.array2string(self.start[:3, 3], precision=2, separator=', ')} m"
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +57,7 @@ class Candidate:
 
     camera_T_parent: Array
     sharp: float
-    ball: Ball
+    place: Place
     path: tuple[tuple[str, Array], ...]
     """Stage and camera_T_parent on the way there."""
 
@@ -77,6 +93,12 @@ class Photographs:
         background = Background.of(canvas.images) if fixed else None
         return Photographs(kinematics, meshes, canvas, few, background, threads)
 
+    def foreground(self) -> NDArray[np.float32] | None:
+        """How unlike the background each pixel of the few is (n, H, W), None where that is not known."""
+        if self.background is None:
+            return None
+        return scene_background.foreground(self.few.images, self.background.image.astype(np.float32))
+
     def lines(self, step: Step, canvas: Canvas) -> Lines:
         """The views of a canvas at the size of a step."""
         background = self.background if step.background else None
@@ -105,53 +127,70 @@ class Maskless:
         joints: solve for constant joint offsets too.
         restarts: descents of the search in a ball before it is given up.
         least_sharp: share of contour points that the images must confirm for an end to be believed.
+        free: the cameras that are tried when no start is to be used.
         threads: that share the views.
     """
 
     joints: bool = False
     restarts: int = 6
     least_sharp: float = 0.3
+    free: ViewSphere | None = None
     threads: int = len(os.sched_getaffinity(0))
 
     def __call__(self, recording: Recording, *, rng: np.random.Generator) -> Estimate:
-        """Calibrate from the recording's start and its photographs alone."""
+        """Calibrate from the photographs alone, about the recording's start unless the search is free."""
         start = recording.initial_parent_T_camera
-        if start is None:
+        if start is None and self.free is None:
             raise Refusal("a start is needed: initial_parent_T_camera, or --init FILE")
         photographs = Photographs.of(recording, self.threads)
+        if self.free is not None and photographs.background is None:
+            raise Refusal(
+                f"without masks a start is found for a fixed camera in {scene_background.FEWEST_VIEWS} photographs or"
+                " more only: give initial_parent_T_camera, --init FILE, or masks"
+            )
         found = self._find(photographs, start, rng)
         if found.sharp < self.least_sharp:
             raise SolverFailure(
                 f"the photographs confirm {100 * found.sharp:.0f} % of the contour where the best of"
-                f" {photographs.descents} descents ended, {100 * self.least_sharp:.0f} % are needed: the start is"
-                f" farther off than {found.ball}, the joints or the robot are not those of the photographs, the"
+                f" {photographs.descents} descents ended, {100 * self.least_sharp:.0f} % are needed: the camera is"
+                f" farther off than {found.place}, the joints or the robot are not those of the photographs, the"
                 " camera or the scene moved, or too little of the robot is seen; give more views or masks"
             )
         return self._finish(photographs, found)
 
-    def _find(self, photographs: Photographs, start: Array, rng: np.random.Generator) -> Candidate:
+    def _find(self, photographs: Photographs, start: Array | None, rng: np.random.Generator) -> Candidate:
         """The first end that the images confirm, or the best of all descents."""
-        foreground = None
-        if photographs.background is not None:
-            scene = photographs.background.image.astype(np.float32)
-            foreground = scene_background.foreground(photographs.few.images, scene)
-        score = Score(photographs.meshes[SEARCH_LEVEL], photographs.few, foreground, self.threads, rng)
-        best = Candidate(se3.inverse(start), -1.0, NEAR, ())
-        for ball in (FAR,) if len(photographs.canvas) >= _FEWEST_FOR_FAR else (NEAR, FAR):
-            for coarse, _ in search(score, start, ball, self.restarts, rng):
+        few, foreground = photographs.few, photographs.foreground()
+        score = Score(photographs.meshes[SEARCH_LEVEL], few, foreground, self.threads, rng)
+        best: Candidate | None = None
+        for place in self._places(photographs, start, foreground):
+            for coarse, _ in search(score, place.start, place.ball, place.restarts, rng):
                 photographs.descents += 1
                 end = photographs.refined(se3.inverse(coarse))
-                within = max(ball.away(start, se3.inverse(end.camera_T_parent))) < _OUTSIDE
-                sharp = end.last.sharp if within else 0.0
-                if sharp > best.sharp:
-                    path = (("start", se3.inverse(start)), ("search", se3.inverse(coarse)))
-                    best = Candidate(end.camera_T_parent, sharp, ball, path)
+                away = place.ball.away(place.start, se3.inverse(end.camera_T_parent))
+                sharp = end.last.sharp if max(away) < _OUTSIDE else 0.0
+                if best is None or sharp > best.sharp:
+                    path = (("start", se3.inverse(place.start)), ("search", se3.inverse(coarse)))
+                    best = Candidate(end.camera_T_parent, sharp, place, path)
                 if sharp >= self.least_sharp:
                     break
-            if best.sharp >= self.least_sharp:
+            if best is not None and best.sharp >= self.least_sharp:
                 break
-        photographs.renders += score.evaluations * len(photographs.few)
+        photographs.renders += score.evaluations * len(few)
+        assert best is not None
         return best
+
+    def _places(
+        self, photographs: Photographs, start: Array | None, foreground: NDArray[np.float32] | None
+    ) -> list[Place]:
+        """Where to search, in this order."""
+        if self.free is not None and foreground is not None:
+            mesh = photographs.meshes[SEARCH_LEVEL]
+            found = starts(mesh, photographs.few, foreground, self.free, _FREE_STARTS, self.threads)
+            return [Place(se3.inverse(pose), _FREE_BALL, 1) for pose in found]
+        assert start is not None
+        balls = (FAR,) if len(photographs.canvas) >= _FEWEST_FOR_FAR else (NEAR, FAR)
+        return [Place(start, ball, self.restarts) for ball in balls]
 
     def _finish(self, photographs: Photographs, found: Candidate) -> Estimate:
         """The last steps on all photographs, and the evidence."""
@@ -183,7 +222,7 @@ class Maskless:
                 "confirmed": found.sharp,
                 "descents": photographs.descents,
                 "background_known": photographs.background is not None,
-                "searched": str(found.ball),
+                "searched": str(found.place),
                 "left_out_around_flange_m": left_out_m,
             },
             extras,
