@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import traceback
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from hecbench import __version__, diagnose, evidence, registry, store
+from hecbench import __version__, diagnose, evidence, registry, se3, store
 from hecbench.errors import InputError, Refusal, SolverFailure
 from hecbench.estimate import Estimate, Status, Termination
 from hecbench.evidence import Evidence
@@ -145,6 +145,20 @@ def _provenance(recording: Recording, options: Options) -> dict[str, Any]:
         "seed": options.seed,
         "command": options.command,
         "versions": _versions(),
+    } | _start_error(recording)
+
+
+def _start_error(recording: Recording) -> dict[str, Any]:
+    """How far off the start is, where the truth is known: kept of every run, also of one without an answer."""
+    start, truth = recording.initial_parent_T_camera, recording.truth_parent_T_camera
+    if start is None or truth is None:
+        return {}
+    inverses = se3.inverse(start), se3.inverse(truth)
+    return {
+        "start": {
+            "camera_T_parent_translation_error_mm": 1e3 * float(se3.translation_error_m(*inverses)),
+            "rotation_error_deg": float(np.rad2deg(se3.rotation_error_rad(start, truth))),
+        }
     }
 
 
@@ -248,6 +262,14 @@ class Task:
         suite = registry.load().get(Kind.SUITE, str(self.suite), SuiteSpec)
         return suite.make(str(self.level), self.index, seed)
 
+    def facts(self, seed: int) -> Mapping[str, float]:
+        """What the suite tells about the item beside its recording."""
+        if self.path is not None:
+            return {}
+        return registry.load().get(Kind.SUITE, str(self.suite), SuiteSpec).facts(
+            str(self.level), self.index, seed
+        )
+
     @property
     def item(self) -> str:
         """The recording's path, or its number in the level."""
@@ -259,9 +281,11 @@ def execute(task: Task, options: Options) -> tuple[list[Estimate], Evidence | No
     specs = [registry.load().get(Kind.SOLVER, name, SolverSpec) for name in task.solvers]
     recording = task.recording(options.seed)
     prepared = prepare(recording)
+    facts = task.facts(options.seed)
+    origin = _provenance(recording, options) | ({"facts": dict(facts)} if facts else {})
     estimates = [
         replace(estimate, suite=task.suite or "files", level=task.level, item=task.item)
-        for estimate in _solve_prepared(prepared, specs, options, _provenance(recording, options))
+        for estimate in _solve_prepared(prepared, specs, options, origin)
     ]
     return estimates, None if task.path is None else _examined(recording, prepared)
 
