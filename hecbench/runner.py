@@ -266,8 +266,10 @@ class Task:
         """What the suite tells about the item beside its recording."""
         if self.path is not None:
             return {}
-        return registry.load().get(Kind.SUITE, str(self.suite), SuiteSpec).facts(
-            str(self.level), self.index, seed
+        return (
+            registry.load()
+            .get(Kind.SUITE, str(self.suite), SuiteSpec)
+            .facts(str(self.level), self.index, seed)
         )
 
     @property
