@@ -43,7 +43,7 @@ def numbers(runs: Sequence[Estimate], pattern: re.Pattern[str], unchanged: int) 
 
 def _of_level(runs: Sequence[Estimate], level: str, changed: Iterable[str]) -> dict[str, list[Estimate]]:
     """The runs of a level by solver; of the unchanged one only solvers that met a change."""
-    solvers = {run.solver for run in runs if run.level in changed}
+    solvers = {run.solver for run in runs if str(run.level) in changed}
     return by_solver(run for run in runs if run.level == level and run.solver in solvers)
 
 

@@ -1,6 +1,7 @@
 """The studies' pages: every run counts, beside the paper's numbers, and the text follows the numbers."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -213,3 +214,17 @@ def test_other_runs_make_no_section(run_of):
     assert sections([]) == []
     assert sections([run_of("park", "tag_2m", 0, suite="markers")]) == []
     assert keypoints.table_two("t", []) is None
+
+
+def test_keypoints_stand_beside_table_two(run_of):
+    run = run_of("drhec", None, "baxter", 12.0, suite="files")
+    told = {f"pck_{threshold}_px": 0.65 for threshold in paper.PCK_THRESHOLDS_PX}
+    told |= {"keypoints": 100, "keypoint_poses": 20, "keypoint_auc": 0.9, "keypoint_mean_px": None}
+    run = replace(run, recording="baxter", diagnostics=told)
+    (section,) = sections([run])
+    row = cells(section.table, "baxter", "drhec")
+    assert (row["keypoints"], row["PCK @20 px"], row["mean px"]) == ("100", "0.65", "-")
+    assert cells(section.table, "Baxter", "paper: DRHeC")["PCK @20 px"] == "0.65"
+    (remark,) = section.remarks
+    assert remark.verdict is Verdict.AGREES
+    assert "65 [43, 82] % within 20 px" in remark.text
