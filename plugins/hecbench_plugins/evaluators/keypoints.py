@@ -43,7 +43,7 @@ def has_keypoints(recording: Recording) -> bool:
     )
 
 
-def pixel_errors(estimate: Estimate, recording: Recording) -> tuple[Array, Array]:
+def pixel_errors(estimate: Estimate, recording: Recording) -> tuple[Array, NDArray[np.intp]]:
     """Distances (K,) px of the keypoints seen, infinite behind the camera, and the sample (K,) of each."""
     camera, corners, target = estimate.camera or recording.camera, recording.corners_px, recording.target
     assert camera is not None
@@ -51,8 +51,8 @@ def pixel_errors(estimate: Estimate, recording: Recording) -> tuple[Array, Array
     assert target is not None
     assert estimate.parent_T_camera is not None
     camera_T_target = se3.inverse(estimate.parent_T_camera) @ recording.hand_poses()
-    seen = np.isfinite(corners).all(-1) & np.isfinite(camera_T_target).all((1, 2))[:, None]
-    samples, points = np.nonzero(seen)
+    placed = np.asarray(np.isfinite(camera_T_target).all((1, 2)))
+    samples, points = np.nonzero(np.isfinite(corners).all(-1) & placed[:, None])
     in_camera = se3.transform_points(camera_T_target, target.points_m)[samples, points]
     in_front = in_camera[:, 2] > 0
     errors = np.full(len(samples), np.inf)
