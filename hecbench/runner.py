@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from hecbench import __version__, diagnose, evidence, registry, se3, store
+from hecbench import __version__, diagnose, evidence, registry, store
 from hecbench.errors import InputError, Refusal, SolverFailure
 from hecbench.estimate import Estimate, Status, Termination
 from hecbench.evidence import Evidence
@@ -145,20 +145,10 @@ def _provenance(recording: Recording, options: Options) -> dict[str, Any]:
         "seed": options.seed,
         "command": options.command,
         "versions": _versions(),
-    } | _start_error(recording)
-
-
-def _start_error(recording: Recording) -> dict[str, Any]:
-    """How far off the start is, where the truth is known: kept of every run, also of one without an answer."""
-    start, truth = recording.initial_parent_T_camera, recording.truth_parent_T_camera
-    if start is None or truth is None:
-        return {}
-    inverses = se3.inverse(start), se3.inverse(truth)
-    return {
-        "start": {
-            "camera_T_parent_translation_error_mm": 1e3 * float(se3.translation_error_m(*inverses)),
-            "rotation_error_deg": float(np.rad2deg(se3.rotation_error_rad(start, truth))),
-        }
+    } | {
+        name: pose.tolist()
+        for name in ("initial_parent_T_camera", "truth_parent_T_camera")
+        if (pose := getattr(recording, name)) is not None
     }
 
 

@@ -16,7 +16,7 @@ from hecbench.report.scores import (
     SUMMARY_NOTE,
     base_name,
     by_solver,
-    errors_mm,
+    ends_mm,
     mean_mm,
     options,
     paired,
@@ -112,7 +112,7 @@ def _best_value(name: str, option: str, values: Series, shared: Sequence[float])
     """Our best median against the value that the paper found best, on the same items."""
     theirs = paper.ABLATIONS[option][1]
     best_there = min(shared, key=lambda value: theirs[value][0])
-    best_here = min(shared, key=lambda value: float(np.median(errors_mm(values[value]))))
+    best_here = min(shared, key=lambda value: float(np.median(ends_mm(values[value]))))
     if best_here == best_there:
         return Remark(
             Verdict.AGREES,
@@ -124,6 +124,6 @@ def _best_value(name: str, option: str, values: Series, shared: Sequence[float])
     )
     if not pairs:
         return Remark(Verdict.OPEN, f"{said}; no item was run with both.")
-    p = statistics.paired_error_p(*(errors_mm(side) for side in zip(*pairs, strict=True)))
+    p = statistics.paired_error_p(*(ends_mm(side) for side in zip(*pairs, strict=True)))
     verdict = Verdict.DIFFERS if p < SIGNIFICANT else Verdict.OPEN
     return Remark(verdict, f"{said}; on {len(pairs)} shared items {p_value(p)} (signed ranks).")

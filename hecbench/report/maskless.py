@@ -10,7 +10,7 @@ import numpy as np
 from hecbench import statistics
 from hecbench.estimate import Estimate, Status
 from hecbench.report.cells import interval, number
-from hecbench.report.scores import by_solver, mean_mm, rate
+from hecbench.report.scores import by_solver, rate
 from hecbench.report.section import Remark, Verdict
 from hecbench.report.svg import COLOURS, legend_beside, panel, svg
 from hecbench.report.table_one import FIRST_LOOK
@@ -87,7 +87,7 @@ def _row(level: str, solver: str, runs: Sequence[Estimate]) -> tuple[str, ...]:
         str(found.count(Outcome.FAILED)),
         rate(each is not Outcome.WRONG for each in found),
         interval(statistics.bootstrap(centre, np.median)) if len(centre) else number(None),
-        interval(mean_mm(runs, _CENTRE)),
+        interval(statistics.bootstrap(centre)) if len(centre) else number(None),
         number(float(np.median(turned)) if turned else None),
         number(float(np.median([run.seconds for run in runs]))),
     )

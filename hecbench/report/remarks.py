@@ -13,14 +13,14 @@ from hecbench.estimate import Estimate
 from hecbench.report import paper
 from hecbench.report.cells import number, p_value
 from hecbench.report.scores import (
-    ERROR,
     FAR_MM,
     SIGNIFICANT,
-    answered,
+    Ending,
     base_name,
     by_solver,
-    errors_mm,
-    in_frame,
+    ending,
+    ends_mm,
+    known_ends,
     mean_mm,
     paired,
     paper_name,
@@ -54,7 +54,7 @@ def order(runs: Sequence[Estimate]) -> list[Remark]:
 def _ordered(
     level: str, setting: str, better: str, worse: str, pairs: list[tuple[Estimate, Estimate]]
 ) -> Remark:
-    first, second = (errors_mm(side) for side in zip(*pairs, strict=True))
+    first, second = (ends_mm(side) for side in zip(*pairs, strict=True))
     p = statistics.paired_error_p(first, second)
     won, lost = int((first < second).sum()), int((first > second).sum())
     names = paper.METHODS[better], paper.METHODS[worse]
@@ -106,25 +106,31 @@ def lost_robots(runs: Sequence[Estimate]) -> list[Remark]:
     """How much of a mean comes from runs that did not find the robot, and whether it had left the picture."""
     said = []
     for solver, found in by_solver(runs).items():
-        have = answered(found)
-        far = [run for run in have if run.errors and run.errors[ERROR] > FAR_MM]
-        unanswered = len(found) - len(have)
-        if not far and not unanswered:
+        counts = Counter(map(ending, found))
+        if counts[Ending.NEAR] == len(found):
             continue
-        share = errors_mm(far).sum() / errors_mm(have).sum() if far else 0.0
-        frames = Counter(in_frame(run) for run in far)
-        told = [
-            f"{frames[key]} {what}"
-            for key, what in ((False, "with the robot out of the picture"), (True, "with it in the picture"))
-            if frames[key]
-        ]
-        text = f"{solver}: {len(far)} of {len(found)} runs end beyond {FAR_MM:g} mm"
-        text += f" and make {100 * share:.0f} % of the mean" if far else ""
-        text += f", {' and '.join(told)}" if told else ""
-        text += f"; {unanswered} have no answer" if unanswered else ""
+        told = ", ".join(f"{counts[each]} {each}" for each in Ending if counts[each])
+        known = known_ends(found)[:, 0]
+        text = f"{solver}: of {len(found)} runs {told}"
+        if known.sum() > 0:
+            share = 100 * known[known > FAR_MM].sum() / known.sum()
+            text += f"; ends beyond {FAR_MM:g} mm make {share:.0f} % of the mean"
         said.append(
             Remark(
-                Verdict.WHY, f"{text}. The median of all is {number(float(np.median(errors_mm(found))))} mm."
+                Verdict.WHY, f"{text}. The median of all is {number(float(np.median(ends_mm(found))))} mm."
             )
         )
+    return said
+
+
+def departures(runs: Sequence[Estimate]) -> list[Remark]:
+    """Methods that were not run as their authors published them."""
+    said = []
+    for solver, found in by_solver(runs).items():
+        reasons = [
+            str(run.diagnostics["not_as_published"]) for run in found if "not_as_published" in run.diagnostics
+        ]
+        if reasons:
+            text = f"{solver} is not the published method in {len(reasons)} of {len(found)} runs, first: {reasons[0]}."
+            said.append(Remark(Verdict.DIFFERS, text))
     return said

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from hecbench import statistics
+from hecbench import se3, statistics
 from hecbench.estimate import Estimate, Status, Termination
 from hecbench.report import paper
 from hecbench.report.cells import NO_ANSWER, interval, number
-from hecbench.report.tables import error_mm
 from hecbench.statistics import Interval
 
 Array = NDArray[np.float64]
@@ -60,24 +60,45 @@ def answered(runs: Iterable[Estimate]) -> list[Estimate]:
     return [run for run in runs if run.status is Status.OK and run.errors]
 
 
-def errors_mm(runs: Iterable[Estimate], name: str = ERROR) -> Array:
-    """The error of every run, `NO_ANSWER` for one without."""
-    return np.array([error_mm(run, name) for run in runs])
+def end(run: Estimate) -> tuple[float, float] | None:
+    """Translation error of camera_T_base, mm, and rotation error, rad, where a run ended; None where that is not known.
+
+    A run that lost the robot out of the picture has no answer, but it tells where it went.
+    """
+    if run.status is Status.OK:
+        errors = run.errors
+        return (errors[ERROR], float(np.deg2rad(errors["rotation_error_deg"]))) if errors else None
+    path, truth = run.diagnostics.get("path"), run.provenance.get("truth_parent_T_camera")
+    if not path or truth is None or run.termination is not Termination.OUT_OF_FRAME:
+        return None
+    return off(se3.exp(np.asarray(path[-1][2], float)), truth)
 
 
-def rotations_rad(runs: Iterable[Estimate]) -> Array:
-    """Rotation errors of the answers."""
-    return np.deg2rad([run.errors["rotation_error_deg"] for run in answered(runs) if run.errors])
+def off(parent_T_camera: ArrayLike, truth: ArrayLike) -> tuple[float, float]:
+    """Translation error of camera_T_parent, mm, and rotation error, rad."""
+    apart = se3.translation_error_m(se3.inverse(parent_T_camera), se3.inverse(truth))
+    return 1e3 * float(apart), float(se3.rotation_error_rad(parent_T_camera, truth))
 
 
-def median_mm(runs: Sequence[Estimate], name: str = ERROR) -> Interval:
+def ends_mm(runs: Iterable[Estimate]) -> Array:
+    """Where every run ended, `NO_ANSWER` where that is not known."""
+    found = (end(run) for run in runs)
+    return np.array([NO_ANSWER if each is None else each[0] for each in found])
+
+
+def known_ends(runs: Iterable[Estimate]) -> Array:
+    """Translation, mm, and rotation, rad, (N, 2) of the runs whose end is known."""
+    return np.array([each for each in map(end, runs) if each is not None]).reshape(-1, 2)
+
+
+def median_mm(runs: Sequence[Estimate]) -> Interval:
     """Over every run."""
-    return statistics.bootstrap(errors_mm(runs, name), np.median)
+    return statistics.bootstrap(ends_mm(runs), np.median)
 
 
-def mean_mm(runs: Sequence[Estimate], name: str = ERROR) -> Interval:
-    """Over the answers; NaN when there are none."""
-    values = errors_mm(answered(runs), name)
+def mean_mm(runs: Sequence[Estimate]) -> Interval:
+    """Over the runs whose end is known; NaN when there are none."""
+    values = known_ends(runs)[:, 0]
     return statistics.bootstrap(values) if len(values) else Interval(np.nan, np.nan, np.nan)
 
 
@@ -94,6 +115,28 @@ def in_frame(run: Estimate) -> bool | None:
     if "in_frame" in run.diagnostics:
         return bool(run.diagnostics["in_frame"])
     return False if run.termination is Termination.OUT_OF_FRAME else None
+
+
+class Ending(StrEnum):
+    """How a run ended."""
+
+    NEAR = "near"
+    LOST = "robot lost"
+    FAR_IN_FRAME = "far, robot in frame"
+    FAR = "far, not told"
+    UNKNOWN = "not known"
+
+
+def ending(run: Estimate) -> Ending:
+    """How a run ended, from where it ended and whether the robot was still in the picture."""
+    seen, found = in_frame(run), end(run)
+    if seen is False:
+        return Ending.LOST
+    if found is None:
+        return Ending.UNKNOWN
+    if found[0] <= FAR_MM:
+        return Ending.NEAR
+    return Ending.FAR if seen is None else Ending.FAR_IN_FRAME
 
 
 def rate(flags: Iterable[bool]) -> str:
@@ -113,8 +156,9 @@ def rate_where(runs: Iterable[Estimate], test: Callable[[Estimate], bool | None]
 
 
 def start_mm(run: Estimate) -> float:
-    """How far off the start was, the same error as `ERROR`; NaN where a run does not tell."""
-    return float(run.provenance.get("start", {}).get(ERROR, np.nan))
+    """How far off the start was, the same error as `ERROR`; NaN where that is not known."""
+    start, truth = (run.provenance.get(f"{name}_parent_T_camera") for name in ("initial", "truth"))
+    return np.nan if start is None or truth is None else off(start, truth)[0]
 
 
 def paired(first: Sequence[Estimate], second: Sequence[Estimate]) -> list[tuple[Estimate, Estimate]]:
@@ -127,11 +171,6 @@ def paired(first: Sequence[Estimate], second: Sequence[Estimate]) -> list[tuple[
     return [(run, others[item(run)]) for run in first if item(run) in others]
 
 
-def no_answer(value: float) -> bool:
-    """Whether an error stands for a missing answer."""
-    return value >= NO_ANSWER
-
-
 SUMMARY_HEADER = (
     "answered",
     "median mm [95 %]",
@@ -140,17 +179,18 @@ SUMMARY_HEADER = (
     f"≤ {SUCCESSES[0][0]:g} mm, {SUCCESSES[0][1]:g} rad, % [95 %]",
 )
 SUMMARY_NOTE = (
-    "Translation error of camera_T_base; medians and rates count every run, means are over the answers."
+    "Translation error of camera_T_base where every run ended, infinite where that is not known; means are of those "
+    "known. A run that lost the robot out of the picture has no answer; it ended where it was last, as in the paper."
 )
 
 
 def summary(runs: Sequence[Estimate]) -> tuple[str, ...]:
     """The cells below `SUMMARY_HEADER`."""
-    rad = rotations_rad(runs)
+    ends = known_ends(runs)
     return (
         f"{len(answered(runs))} of {len(runs)}",
         interval(median_mm(runs)),
         interval(mean_mm(runs)),
-        number(rad.mean() if len(rad) else None),
+        number(ends[:, 1].mean() if len(ends) else None),
         rate(within(run, *SUCCESSES[0]) for run in runs),
     )

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from hecbench.estimate import Estimate
 from hecbench.report import ablations, curves, keypoints, maskless, paper, variations
-from hecbench.report.remarks import lost_robots, table_one_remarks
+from hecbench.report.remarks import departures, lost_robots, table_one_remarks
 from hecbench.report.section import Remark, Section
 from hecbench.report.table_one import endings, published, table_one
 from hecbench.report.tables import Table
@@ -40,8 +40,8 @@ def _published(suite: str, runs: Sequence[Estimate]) -> list[Section]:
         levels = [level for level in paper.LEVELS if any(run.level == level for run in starts)]
         table = table_one(f"{suite}: starts LP, MP, HP beside the paper's Table I", starts)
         drawn = (figure(starts, levels) for figure in (curves.error_curves, curves.cost_curves))
-        found.append(_section(table, starts, table_one_remarks(starts), drawn))
-        drawn = (figure(starts, levels) for figure in (curves.basin, curves.descents))
+        found.append(_section(table, starts, [*departures(starts), *table_one_remarks(starts)], drawn))
+        drawn = (figure(starts, levels) for figure in (curves.progress_curves, curves.basin))
         found.append(
             _section(endings(f"{suite}: how the runs end", starts), starts, lost_robots(starts), drawn)
         )
@@ -54,9 +54,13 @@ def _published(suite: str, runs: Sequence[Estimate]) -> list[Section]:
             of_level = [run for run in runs if run.level == option]
             found.append(_section(table_or_none, of_level, ablations.remarks(runs, option)))
     for heading, make, said in (
-        ("more views", variations.views, ()),
+        ("more views", variations.views, []),
         ("wrong geometry", variations.mismatch, variations.mismatch_remarks(runs)),
-        ("changed appearance", variations.appearance, ()),
+        (
+            "changed appearance",
+            variations.appearance,
+            departures([r for r in runs if r.level not in paper.LEVELS]),
+        ),
     ):
         table_or_none = make(f"{suite}: {heading}", runs)
         if table_or_none is not None:
@@ -66,7 +70,8 @@ def _published(suite: str, runs: Sequence[Estimate]) -> list[Section]:
 
 def _maskless(suite: str, runs: Sequence[Estimate]) -> list[Section]:
     table = maskless.outcomes(f"{suite}: right, silent or wrong", runs)
-    return [_section(table, runs, maskless.remarks(runs), (maskless.error_figure(runs),))]
+    said = [*maskless.remarks(runs), *departures(runs)]
+    return [_section(table, runs, said, (maskless.error_figure(runs),))]
 
 
 def _section(

@@ -19,13 +19,21 @@ def make_run(
     start_mm=100.0,
     floor_mm=None,
     status=Status.OK,
+    lost=False,
     costs=(),
 ):
-    """One result; an error of None has no answer."""
+    """One result that ends at the identity, the truth being `error_mm` and `rad` away from there.
+
+    An error of None has no answer and tells no end; `lost` has none either, but tells where the robot was lost.
+    """
+    rad = (error_mm or 0.0) / 500 if rad is None else rad
+    truth = se3.from_rotvec([rad, 0, 0], [(error_mm or 0.0) / 1e3, 0, 0])
+    start = se3.make(truth[:3, :3], truth[:3, 3] + [0, start_mm / 1e3, 0])
     origin = {
         "recording_sha256": f"{level} {item}",
         "seed": 0,
-        "start": {"camera_T_parent_translation_error_mm": start_mm, "rotation_error_deg": 8.0},
+        "truth_parent_T_camera": truth.tolist(),
+        "initial_parent_T_camera": start.tolist(),
     }
     if floor_mm is not None:
         origin["facts"] = {"correspondence_floor_mm": floor_mm}
@@ -33,16 +41,29 @@ def make_run(
     if error_mm is None:
         status = Status.FAILED if status is Status.OK else status
         return Estimate(status=status, reason="lost", termination=Termination.STALLED, seconds=2.0, **place)
+    left = np.linspace(1, 0, max(len(costs), 2))
+    way = se3.log(start)
+    path = [[f"step {i}", cost, (left[i] * way).tolist()] for i, cost in enumerate(costs or (None, 1.0))]
+    diagnostics = {"path": path} | ({} if in_frame is None else {"in_frame": in_frame})
+    if lost:
+        return Estimate(
+            status=Status.FAILED,
+            reason="the robot left the picture",
+            termination=Termination.OUT_OF_FRAME,
+            diagnostics=diagnostics | {"in_frame": False},
+            iterations=700,
+            seconds=2.0,
+            **place,
+        )
     errors = {
         "camera_T_parent_translation_error_mm": error_mm,
         "translation_error_mm": error_mm,
         "tre_mm": error_mm,
-        "rotation_error_deg": np.rad2deg(error_mm / 500 if rad is None else rad),
+        "rotation_error_deg": np.rad2deg(rad),
     }
-    away = np.linspace(0.3, 0, max(len(costs), 2))
-    path = [[f"step {i}", cost, [0, 0, 0, away[i], 0, 0]] for i, cost in enumerate(costs or (None, 1.0))]
-    diagnostics = {"path": path} | ({} if in_frame is None else {"in_frame": in_frame})
-    return Estimate(se3.exp(np.zeros(6)), errors=errors, diagnostics=diagnostics, seconds=2.0, **place)
+    return Estimate(
+        se3.exp(np.zeros(6)), errors=errors, diagnostics=diagnostics, iterations=2000, seconds=2.0, **place
+    )
 
 
 @pytest.fixture(scope="session")
@@ -64,10 +85,9 @@ def study_runs(count=20, seed=0):
         length = 60
         costs = 0.02 * np.exp(-np.linspace(0, 1.0 if gone else 6.0, length) * rng.uniform(0.8, 1.2)) + 1e-5
         start = rng.uniform(60, 120) * (1 + 2 * levels.get(level, 0.4)) + 80 * gone
-        frame = bool(not gone or rng.random() < 0.4)
-        return make_run(
-            solver, level, item, error, in_frame=frame, start_mm=float(start), costs=costs.tolist(), **more
-        )
+        out = bool(gone and rng.random() < 0.6)
+        more |= {"in_frame": True, "lost": out, "start_mm": float(start), "costs": costs.tolist()}
+        return make_run(solver, level, item, error, **more)
 
     for level, hardness in levels.items():
         for base, share in lost.items():

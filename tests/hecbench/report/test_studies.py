@@ -8,8 +8,8 @@ import pytest
 
 from hecbench.estimate import Status
 from hecbench.report import ablations, curves, html, keypoints, maskless, paper, variations
-from hecbench.report.remarks import lost_robots, means, order
-from hecbench.report.scores import in_frame, rate_where, summary
+from hecbench.report.remarks import departures, lost_robots, means, order
+from hecbench.report.scores import Ending, end, ending, in_frame, rate_where, start_mm, summary
 from hecbench.report.section import Verdict
 from hecbench.report.studies import sections
 from hecbench.report.table_one import endings, published, table_one
@@ -60,19 +60,43 @@ def test_table_one_counts_every_run(run_of):
     assert table.rows.index(tuple(ours.values())) + 1 == table.rows.index(tuple(theirs.values()))
 
 
+def test_a_lost_robot_ends_where_it_was_last_and_is_no_success(run_of):
+    lost = run_of("drhec", "MP", 1, 301.0, rad=0.2, lost=True)
+    assert end(lost) == (pytest.approx(301.0), pytest.approx(0.2))
+    assert ending(lost) is Ending.LOST
+    row = cells(table_one("t", [run_of("drhec", "MP", 0, 1.0, in_frame=True), lost]), "MP", "drhec")
+    assert row["answered"] == "1 of 2"
+    assert row["largest mm"] == "301"
+    assert row["mean mm [95 %]"].startswith("151 [")
+    assert row["≤ 50 mm, 0.1 rad, % [95 %]"].startswith("50 [")
+    assert row["in frame %; paper: success %"].startswith("50 [")
+
+
 def test_how_runs_end(run_of):
     runs = [run_of("drhec_rgb", "LP", i, 1.0, in_frame=True, start_mm=80.0 + i) for i in range(10)]
-    runs += [run_of("drhec_rgb", "LP", 10 + i, 900.0, in_frame=i < 2, start_mm=160.0 + i) for i in range(8)]
+    runs += [run_of("drhec_rgb", "LP", 10 + i, 900.0, in_frame=True, start_mm=160.0 + i) for i in range(2)]
+    runs += [run_of("drhec_rgb", "LP", 20 + i, 900.0, lost=True, start_mm=160.0 + i) for i in range(6)]
+    runs.append(run_of("drhec_rgb", "LP", 98, 400.0, start_mm=170.0))
     runs.append(run_of("drhec_rgb", "LP", 99, None, start_mm=170.0))
     row = cells(endings("t", runs), "LP", "drhec_rgb")
-    assert (row["runs"], row["near"], row["no answer"]) == ("19", "10", "1")
-    assert row["beyond 100 mm, robot in frame"] == "2"
-    assert row["beyond 100 mm, out of frame"] == "6"
+    told = [row[name] for name in ("runs", "near", "robot lost", "end not known")]
+    assert told == ["20", "10", "6", "1"]
+    assert (row["beyond 100 mm, robot in frame"], row["beyond 100 mm, not told"]) == ("2", "1")
     assert row["share of the mean from beyond 100 mm %"] == "100"
+    assert (row["start median mm: near"], row["start median mm: others"]) == ("84.5", "162")
     assert row["start decides"].startswith("p\u00a0<")
     (remark,) = lost_robots(runs)
-    assert "8 of 19 runs" in remark.text
-    assert "6 with the robot out of the picture" in remark.text
+    assert (
+        "of 20 runs 10 near, 6 robot lost, 2 far, robot in frame, 1 far, not told, 1 not known" in remark.text
+    )
+
+
+def test_a_method_that_is_not_the_published_one_is_told(run_of):
+    run = run_of("drhec", "gain", 0, 1.0)
+    run = replace(run, diagnostics={**run.diagnostics, "not_as_published": "the background is not black"})
+    (remark,) = departures([run, run_of("drhec", "gain", 1, 1.0)])
+    assert "drhec is not the published method in 1 of 2 runs, first: the background" in remark.text
+    assert any(remark in section.remarks for section in sections([run, run_of("drhec", "gain", 1, 1.0)]))
 
 
 @pytest.mark.parametrize(
@@ -97,6 +121,8 @@ def test_published_means_are_placed_in_our_intervals(run_of):
     table = published("t", runs)
     assert cells(table, "MP", "drhec")["the paper's lies"] == "-"
     assert [row[4] for row in table.rows] == ["above", "inside"]
+    assert cells(table, "MP", "drhec")["s per 1,000 iterations, median"] == "1"
+    assert cells(table, "MP", "drhec")["paper's, RTX 4090"] == "7.19"
     (remark,) = means(runs)
     assert "1 inside (DRHeC MP)" in remark.text
     assert "1 above (IPE MP)" in remark.text
@@ -149,6 +175,14 @@ def test_frames_are_counted_where_they_are_told(run_of):
     assert summary([run_of("a", "LP", 0, None)])[1:3] == ("∞ [-, -]", "- [-, -]")
 
 
+def test_starts_and_ways_are_measured_against_the_truth(run_of):
+    run = run_of("drhec", "LP", 0, 2.0, start_mm=150.0, costs=(1.0, 0.5, 0.1))
+    assert start_mm(run) == pytest.approx(150.0)
+    found = curves._errors_on_the_way(run)
+    assert (found[0], found[-1]) == (pytest.approx(150.0), pytest.approx(2.0))
+    assert curves.progress_curves([run], ["LP"]).startswith("<svg")
+
+
 def test_wrong_answers_come_first(run_of):
     errors = [5.0, 6.0, 50.0, None, 10.0]
     runs = [
@@ -173,7 +207,7 @@ def test_a_method_that_never_answers(run_of):
     assert curves.error_curves(runs, ["LP", "MP"]) is None
     assert curves.cost_curves(runs, ["LP", "MP"]) is None
     assert curves.basin(runs, ["LP"]) is None
-    assert curves.descents(runs, ["LP"]) is None
+    assert curves.progress_curves(runs, ["LP"]) is None
     assert sections(runs)[0].table.rows == table.rows
 
 
