@@ -12,10 +12,12 @@ NO_ANSWER = 1e12
 
 
 def number(value: float | np.floating | None) -> str:
-    """Three digits; a dash for nothing, infinity for a run without an answer."""
+    """Three digits, two of what is small; a dash for nothing, infinity for a run without an answer."""
     if value is None or np.isnan(value):
         return ABSENT
-    return "∞" if value >= NO_ANSWER / 1000 else f"{value:.3g}" if value < 1000 else f"{value:.0f}"
+    if value >= NO_ANSWER / 1000:
+        return "∞"
+    return f"{value:.0f}" if value >= 1000 else f"{value:.2g}" if abs(value) < 0.01 else f"{value:.3g}"
 
 
 def interval(interval: Interval) -> str:

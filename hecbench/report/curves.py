@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 _POINTS = 60
 _BASINS_IN_A_ROW = 5
 _SMALLEST_MM = 1e-4
+_SMALLEST_SHARE = 1e-5
+"""Paths tell costs to six digits after the point."""
 _DASHES = ("-", "--", ":", "-.")
 
 
@@ -93,9 +95,9 @@ def _evenly(curve: Array) -> Array:
 
 def _relative_costs(run: Estimate) -> Array | None:
     costs = [step[1] for step in run.diagnostics.get("path", ()) if step[1] is not None]
-    if len(costs) < 2 or min(costs) <= 0:
+    if len(costs) < 2 or min(costs) < 0 or costs[0] <= 0:
         return None
-    return np.asarray(costs, float) / float(costs[0])
+    return np.maximum(np.asarray(costs, float) / float(costs[0]), _SMALLEST_SHARE)
 
 
 def _errors_on_the_way(run: Estimate) -> Array | None:
