@@ -37,6 +37,8 @@ def adjusted(recording: Recording, views: int | None, init: Path | None, seed: i
 def with_robot(recording: Recording, urdf: Path) -> Recording:
     """The recording with a robot model of the user's, which must have the recording's links and joints.
 
+    Notes that ask for `--urdf` are done with.
+
     Raises:
         InputError: the URDF or a mesh cannot be read, or a link or joint is not in it.
     """
@@ -48,7 +50,9 @@ def with_robot(recording: Recording, urdf: Path) -> Recording:
     model.limits(names)
     for link in (robot.base_link, robot.flange_link):
         model.link_index(link)
-    return replace(recording, robot=replace(robot, model=None, urdf=urdf, joint_names=names))
+    notes = tuple(note for note in recording.notes if "--urdf" not in note)
+    described = replace(robot, model=None, urdf=urdf, joint_names=names)
+    return replace(recording, robot=described, notes=notes)
 
 
 def solvers_for(names: Sequence[str], recording: Recording) -> list[SolverSpec]:

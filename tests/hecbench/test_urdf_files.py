@@ -1,5 +1,7 @@
 """A URDF is copied with all it needs, and draws the same afterwards."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -79,7 +81,9 @@ def recording(**robot):
 
 
 def test_a_recording_gets_a_robot_and_keeps_it(urdf, tmp_path):
-    with_robot = planning.with_robot(recording(base_link="a", flange_link="b"), urdf)
+    bare = replace(recording(base_link="a", flange_link="b"), notes=("give --urdf FILE", "holds no start"))
+    with_robot = planning.with_robot(bare, urdf)
+    assert with_robot.notes == ("holds no start",)
     recording_io.save(with_robot, tmp_path / "cell")
     urdf.parent.rename(tmp_path / "gone")
     loaded = recording_io.load(tmp_path / "cell")
@@ -100,3 +104,15 @@ def test_a_recording_gets_a_robot_and_keeps_it(urdf, tmp_path):
 def test_another_robots_urdf_is_refused(urdf, robot, message):
     with pytest.raises(InputError, match=message):
         planning.with_robot(recording(**robot), urdf)
+
+
+def test_a_fixed_joint_needs_no_axis_and_a_moving_one_does(tmp_path):
+    text = (
+        '<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="{}"><parent link="a"/>'
+        '<child link="b"/><axis xyz="0 0 0"/></joint></robot>'
+    )
+    (tmp_path / "fixed.urdf").write_text(text.format("fixed"))
+    (tmp_path / "moving.urdf").write_text(text.format("continuous"))
+    assert np.isfinite(load_robot(tmp_path / "fixed.urdf").joints[0].axis).all()
+    with pytest.raises(InputError, match=r"moving\.urdf: joint 'j' moves along no axis"):
+        load_robot(tmp_path / "moving.urdf")
