@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from enum import StrEnum
 
@@ -48,13 +49,22 @@ def counted(runs: Sequence[Estimate]) -> list[Estimate]:
     return [run for run in runs if run.status is not Status.OK or run.errors]
 
 
+def _levels(runs: Sequence[Estimate]) -> list[str]:
+    """The levels, those with fewer views first."""
+
+    def natural(level: str) -> list[tuple[int, str]]:
+        return [(int(part), "") if part.isdecimal() else (-1, part) for part in re.findall(r"\d+|\D+", level)]
+
+    return sorted({str(run.level) for run in runs}, key=natural)
+
+
 def outcomes(title: str, runs: Sequence[Estimate]) -> Table:
     """One row per level and method, the wrong answers first."""
     left_out, runs = len(runs), counted(runs)
     left_out -= len(runs)
     rows: list[tuple[str, ...]] = []
     looks: list[str] = []
-    for level in sorted({str(run.level) for run in runs}):
+    for level in _levels(runs):
         of_level = by_solver(run for run in runs if run.level == level)
         rows += [_row(level, solver, found) for solver, found in of_level.items()]
         looks += [FIRST_LOOK if place == 0 else "" for place in range(len(of_level))]
@@ -120,7 +130,7 @@ def error_figure(runs: Sequence[Estimate]) -> str | None:
     have = [run for run in runs if run.status is Status.OK and run.errors]
     if not have:
         return None
-    levels = sorted({str(run.level) for run in runs})
+    levels = _levels(runs)
     figure, (axes,) = panel(8.5, 1.1 + 0.3 * len(levels), columns=1)
     rng = np.random.default_rng(0)
     drawn = [run.errors[_CENTRE] for run in have if run.errors]
