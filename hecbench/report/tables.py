@@ -132,6 +132,8 @@ def _recording_table(title: str, estimates: Sequence[Estimate]) -> Table:
         ("held-out deg", lambda e: number((e.held_out or {}).get("target_deg"))),
         ("spread deg", lambda e: number(e.diagnostics.get("target_spread_deg"))),
         ("spread mm", lambda e: number(e.diagnostics.get("target_spread_mm"))),
+        ("keypoints median px", lambda e: number(e.diagnostics.get("keypoint_median_px"))),
+        ("PCK @50 px", lambda e: number(e.diagnostics.get("pck_50_px"))),
         ("TRE mm", lambda e: number((e.errors or {}).get("tre_mm"))),
         ("camera centre mm", lambda e: number((e.errors or {}).get("translation_error_mm"))),
         ("rotation deg", lambda e: number((e.errors or {}).get("rotation_error_deg"))),

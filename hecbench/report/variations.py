@@ -147,8 +147,9 @@ def floor_ratio(runs: Sequence[Estimate]) -> Interval | None:
 def mismatch_remarks(runs: Sequence[Estimate]) -> list[Remark]:
     """Whether the paper's means lie in our intervals, and how near the floor a method comes."""
     said = []
-    for level, pct in numbers(runs, _MISMATCH, 0).items():
-        for solver, found in by_solver(run for run in runs if run.level == level).items():
+    levels = numbers(runs, _MISMATCH, 0)
+    for level, pct in levels.items():
+        for solver, found in _of_level(runs, level, {*levels} - {UNCHANGED}).items():
             if paper_name(solver) == "DRHeC" and pct in paper.MISMATCH:
                 ours, theirs = mean_mm(found), paper.MISMATCH[pct][0]
                 place = stands(theirs, ours.low, ours.high)

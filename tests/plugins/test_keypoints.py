@@ -10,6 +10,7 @@ from hecbench_plugins.evaluators import keypoints
 from hecbench import diagnose, registry, runner, se3
 from hecbench.estimate import Estimate, Status
 from hecbench.recording import CameraModel, Mounting, Recording
+from hecbench.report.tables import Group, table
 from hecbench.specs import Kind, SolverSpec
 from hecbench.targets import PointsTarget
 
@@ -113,3 +114,5 @@ def test_the_runner_applies_them(labelled):
     assert estimate.diagnostics["pck_20_px"] == 1.0
     assert estimate.errors["add_mm"] < 1e-9
     assert "links_add_mm" not in estimate.errors
+    shown = table(Group("baxter", (estimate,), is_level=False))
+    assert shown.rows[0][shown.header.index("PCK @50 px")] == "1"
