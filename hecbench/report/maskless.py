@@ -20,6 +20,7 @@ from hecbench.report.tables import Table
 SUITE_PREFIX = "maskless"
 RIGHT_MM, RIGHT_DEG = 30.0, 2.0
 _NAMED = 5
+_ENOUGH = 200
 _TICKS_MM = (0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1000, 2000)
 _CENTRE, _ROTATION = "translation_error_mm", "rotation_error_deg"
 
@@ -50,10 +51,11 @@ def counted(runs: Sequence[Estimate]) -> list[Estimate]:
 
 
 def _levels(runs: Sequence[Estimate]) -> list[str]:
-    """The levels, those with fewer views first."""
+    """The levels, those with fewer views first and those without views in their name last."""
 
-    def natural(level: str) -> list[tuple[int, str]]:
-        return [(int(part), "") if part.isdecimal() else (-1, part) for part in re.findall(r"\d+|\D+", level)]
+    def natural(level: str) -> list[tuple[bool, int, str]]:
+        parts = re.findall(r"\d+|\D+", level)
+        return [(False, int(part), "") if part.isdecimal() else (True, 0, part) for part in parts]
 
     return sorted({str(run.level) for run in runs}, key=natural)
 
@@ -75,7 +77,7 @@ def outcomes(title: str, runs: Sequence[Estimate]) -> Table:
     )  # fmt: skip
     notes = (
         f"Right: camera centre within {RIGHT_MM:g} mm and rotation within {RIGHT_DEG:g} deg of the truth. Silent: "
-        "refused or failed, with a reason. Errors are of the answered runs, wrong ones included.",
+        "refused or failed, with a reason; a suite may have levels where nothing else is due. Errors are of the answered runs, wrong ones included.",
         *([f"{left_out} answers without a known truth are not counted."] if left_out else []),
     )
     return Table(title, header, tuple(rows), notes, left=2, looks=tuple(looks))
@@ -113,7 +115,9 @@ def remarks(runs: Sequence[Estimate]) -> list[Remark]:
         bound = f"the rate lies below {100 * most:.1f} % (95 %)"
         text = f"{solver}: wrong answers with status ok: {wrong} of {len(ends)} runs, {bound}."
         if not wrong:
-            said.append(Remark(Verdict.AGREES, text))
+            enough = len(ends) >= _ENOUGH
+            more = "" if enough else f" It takes {_ENOUGH} runs without one to rely on it."
+            said.append(Remark(Verdict.AGREES if enough else Verdict.OPEN, text + more))
             continue
         places = [
             f"{run.level} item {run.item}"

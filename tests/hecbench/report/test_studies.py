@@ -197,9 +197,12 @@ def test_wrong_answers_come_first(run_of):
     assert remark.verdict is Verdict.ALARM
     assert "2 of 7 runs" in remark.text
     assert "1_view item 2, 1_view item 10" in remark.text
-    assert maskless.remarks(runs[:2])[0].verdict is Verdict.AGREES
+    assert maskless.remarks(runs[:2])[0].verdict is Verdict.OPEN
+    assert maskless.remarks(runs[:2] * 100)[0].verdict is Verdict.AGREES
     more = [run_of("render_gn", f"{n}_views", 0, 1.0, suite="maskless_real") for n in (40, 5, 10)]
-    assert [row[0] for row in maskless.outcomes("t", more).rows] == ["5_views", "10_views", "40_views"]
+    more.append(run_of("render_gn", "hopeless", 0, None, suite="maskless_real"))
+    ordered = [row[0] for row in maskless.outcomes("t", more).rows]
+    assert ordered == ["5_views", "10_views", "40_views", "hopeless"]
 
 
 def test_a_method_that_never_answers(run_of):
