@@ -13,7 +13,8 @@ NO_ANSWER = 1e12
 
 def number(value: float | np.floating | None) -> str:
     """Three digits, two of what is small; a dash for nothing, infinity for a run without an answer."""
-    if value is None or np.isnan(value):
+    value = np.nan if value is None else float(value)
+    if np.isnan(value):
         return ABSENT
     if value >= NO_ANSWER / 1000:
         return "∞"
