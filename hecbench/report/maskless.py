@@ -77,8 +77,8 @@ def outcomes(title: str, runs: Sequence[Estimate]) -> Table:
     )  # fmt: skip
     notes = (
         f"Right: camera centre within {RIGHT_MM:g} mm and rotation within {RIGHT_DEG:g} deg of the truth. Silent: "
-        "refused or failed, with a reason; a suite may have levels where nothing else is due. Errors are of the answered "
-        "runs, wrong ones included.",
+        "refused or failed, with a reason; a suite may have levels where nothing else is due. Errors are of the "
+        "answered runs, wrong ones included.",
         *([f"{left_out} answers without a known truth are not counted."] if left_out else []),
     )
     return Table(title, header, tuple(rows), notes, left=2, looks=tuple(looks))
