@@ -327,9 +327,10 @@ def render(recording: Path, answer: Path, out: Path | None) -> None:
 @click.option(
     "--format", "format_name", metavar="F", help="A dataset of `hecbench plugins`; default: recognised."
 )
-def import_recording(source: Path, destination: Path, format_name: str | None) -> None:
+@click.option("--urdf", type=_file, help="The robot's model; it is copied with its meshes into DEST.")
+def import_recording(source: Path, destination: Path, format_name: str | None, urdf: Path | None) -> None:
     """Read a recording SRC of any known format and write it as a native folder DEST."""
-    from hecbench import recording_io, registry, runner
+    from hecbench import planning, recording_io, registry, runner
     from hecbench.specs import DatasetSpec, Kind
 
     if recording_io.is_recording(destination):
@@ -338,6 +339,8 @@ def import_recording(source: Path, destination: Path, format_name: str | None) -
         loaded = runner.load_recording(source)
     else:
         loaded = registry.load().get(Kind.DATASET, format_name, DatasetSpec).load(source)
+    if urdf is not None:
+        loaded = planning.with_robot(loaded, urdf)
     recording_io.save(loaded, destination)
     for note in loaded.notes:
         console.say(note)

@@ -10,7 +10,8 @@ import numpy as np
 
 from hecbench import estimate, registry, runner
 from hecbench.errors import InputError
-from hecbench.recording import Recording
+from hecbench.recording import Recording, RobotDescription
+from hecbench.robot import load_robot
 from hecbench.runner import Task
 from hecbench.specs import Kind, SolverSpec, SuiteSpec
 
@@ -31,6 +32,27 @@ def adjusted(recording: Recording, views: int | None, init: Path | None, seed: i
             )
         recording = replace(recording, initial_parent_T_camera=start.parent_T_camera)
     return recording
+
+
+def with_robot(recording: Recording, urdf: Path) -> Recording:
+    """The recording with a robot model of the user's, which must have the recording's links and joints.
+
+    Notes that ask for `--urdf` are done with.
+
+    Raises:
+        InputError: the URDF or a mesh cannot be read, or a link or joint is not in it.
+    """
+    if recording.joints_rad is None:
+        raise InputError(f"--urdf {urdf}: {recording.name} has no joints_rad to place the robot's links by")
+    model = load_robot(urdf)
+    robot = recording.robot or RobotDescription()
+    names = robot.joint_names or model.joint_names
+    model.limits(names)
+    for link in (robot.base_link, robot.flange_link):
+        model.link_index(link)
+    notes = tuple(note for note in recording.notes if "--urdf" not in note)
+    described = replace(robot, model=None, urdf=urdf, joint_names=names)
+    return replace(recording, robot=described, notes=notes)
 
 
 def solvers_for(names: Sequence[str], recording: Recording, segmenter: str | None = None) -> list[SolverSpec]:

@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import files
+from hecbench import files, urdf_files
 from hecbench.errors import InputError
 from hecbench.estimate import plain
 from hecbench.recording import CameraModel, ImageSource, Mounting, Recording, RobotDescription
@@ -276,7 +276,7 @@ def save(recording: Recording, folder: Path) -> None:
     ]
     robot = recording.robot and {
         "model": recording.robot.model,
-        "urdf": recording.robot.urdf and _copied(recording.robot.urdf, folder, "robot"),
+        "urdf": recording.robot.urdf and _copied_robot(recording.robot.urdf, folder),
         "base_link": recording.robot.base_link,
         "flange_link": recording.robot.flange_link,
         "joint_names": recording.robot.joint_names,
@@ -342,6 +342,13 @@ def encode_png(picture: NDArray[np.uint8]) -> bytes:
     stream = io.BytesIO()
     Image.fromarray(picture).save(stream, "PNG")
     return stream.getvalue()
+
+
+def _copied_robot(urdf: Path, folder: Path) -> str:
+    """The path of a URDF relative to the folder, copied in with its meshes when it lies outside."""
+    if not urdf.resolve().is_relative_to(folder.resolve()):
+        urdf = urdf_files.copy(urdf, folder / "robot")
+    return urdf.resolve().relative_to(folder.resolve()).as_posix()
 
 
 def _copied(source: Path, folder: Path, kind: str) -> str:

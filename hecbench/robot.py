@@ -271,7 +271,10 @@ def _joint(joint: Any, path: Path) -> Joint:
         raise InputError(
             f"{path}: joint '{joint.name}' is {joint.type}: only {', '.join(_MOTIONS)} are supported"
         )
-    axis = np.array([1.0, 0, 0]) if joint.axis is None else np.asarray(joint.axis, float)
+    unused = joint.axis is None or joint.type == "fixed"
+    axis = np.array([1.0, 0, 0]) if unused else np.asarray(joint.axis, float)
+    if not np.linalg.norm(axis) > 0:
+        raise InputError(f"{path}: joint '{joint.name}' moves along no axis: correct its <axis xyz=...>")
     limited = joint.limit is not None and joint.type in ("revolute", "prismatic")
     return Joint(
         name=joint.name,

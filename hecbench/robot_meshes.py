@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench.errors import InputError
+from hecbench.urdf_files import find_mesh
 
 _CACHE_VERSION = 1
 _GREY = (0.7, 0.7, 0.7)
-_PACKAGE = "package://"
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ def visual_parts(robot: Any, urdf: Path) -> tuple[Part, ...]:
         InputError: a mesh file is missing, unreadable or without faces; the message names it.
     """
     files = {
-        visual.geometry.mesh.filename: _find(visual.geometry.mesh.filename, urdf)
+        visual.geometry.mesh.filename: find_mesh(visual.geometry.mesh.filename, urdf)
         for link in robot.links
         for visual in link.visuals
         if visual.geometry.mesh is not None
@@ -61,18 +61,6 @@ def visual_parts(robot: Any, urdf: Path) -> tuple[Part, ...]:
         )
         _write(entry, parts)
     return parts
-
-
-def _find(filename: str, urdf: Path) -> Path:
-    """The mesh file: relative to the URDF's folder or one above it, with or without a package's name."""
-    relative = Path(filename.removeprefix(_PACKAGE).removeprefix("file://"))
-    tails = [Path(*relative.parts[skip:]) for skip in range(len(relative.parts))]
-    places = (urdf.parent, *urdf.parent.absolute().parents[:2])
-    for place in places:
-        for tail in tails if filename.startswith(_PACKAGE) else [relative]:
-            if (place / tail).is_file():
-                return place / tail
-    raise InputError(f"{urdf}: mesh '{filename}' is not there: put it beside the URDF or correct its path")
 
 
 def _named_colours(robot: Any) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 import traceback
 import zlib
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
@@ -210,6 +210,10 @@ def _provenance(recording: Recording, options: Options) -> dict[str, Any]:
         "masks": options.segmenter,
         "command": options.command,
         "versions": _versions(),
+    } | {
+        name: pose.tolist()
+        for name in ("initial_parent_T_camera", "truth_parent_T_camera")
+        if (pose := getattr(recording, name)) is not None
     }
 
 
@@ -313,6 +317,16 @@ class Task:
         suite = registry.load().get(Kind.SUITE, str(self.suite), SuiteSpec)
         return suite.make(str(self.level), self.index, seed)
 
+    def facts(self, seed: int) -> Mapping[str, float]:
+        """What the suite tells about the item beside its recording."""
+        if self.path is not None:
+            return {}
+        return (
+            registry.load()
+            .get(Kind.SUITE, str(self.suite), SuiteSpec)
+            .facts(str(self.level), self.index, seed)
+        )
+
     @property
     def item(self) -> str:
         """The recording's path, or its number in the level."""
@@ -324,9 +338,11 @@ def execute(task: Task, options: Options) -> tuple[list[Estimate], Evidence | No
     specs = [registry.load().get(Kind.SOLVER, name, SolverSpec) for name in task.solvers]
     recording = task.recording(options.seed)
     prepared = segmented(prepare(recording), options.segmenter)
+    facts = task.facts(options.seed)
+    origin = _provenance(recording, options) | ({"facts": dict(facts)} if facts else {})
     estimates = [
         replace(estimate, suite=task.suite or "files", level=task.level, item=task.item)
-        for estimate in _solve_prepared(prepared, specs, options, _provenance(recording, options))
+        for estimate in _solve_prepared(prepared, specs, options, origin)
     ]
     return estimates, None if task.path is None else _examined(recording, prepared.recording)
 

@@ -116,6 +116,7 @@ class SuiteSpec(Spec):
     """Generated recordings. `make(level, index, seed)` depends on nothing else: items stream in any order.
 
     `solvers(level)` names those that a level is meant for; without it all take part that its recordings can feed.
+    `facts(level, index, seed)` tells numbers about an item that no solver sees and reports show.
     """
 
     kind: ClassVar[Kind] = Kind.SUITE
@@ -123,6 +124,7 @@ class SuiteSpec(Spec):
     default_samples: int
     make: Callable[[str, int, int], Recording]
     solvers: Callable[[str], tuple[str, ...]] = lambda level: ()
+    facts: Callable[[str, int, int], Mapping[str, float]] = lambda level, index, seed: {}
 
 
 @dataclass(frozen=True, kw_only=True)

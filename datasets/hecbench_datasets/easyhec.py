@@ -1,15 +1,21 @@
-"""EasyHeC offline examples (folder or zip): color/, mask/, qpos/, K.txt of a Franka Panda, camera fixed."""
+"""EasyHeC offline examples (folder or zip): color/, mask/, qpos/, K.txt of a Franka Panda, camera fixed.
+
+A ``Tc_c2b.txt``, camera_T_base, is the truth where there is one. No file names the robot: a URDF in the folder is
+taken.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from pathlib import Path, PurePosixPath
 
-from hecbench import files
+from hecbench import files, se3
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel, ImageSource, Mounting, Recording, RobotDescription
 from hecbench.registry import hookimpl
 from hecbench.specs import DatasetSpec
+from hecbench_datasets.reading.arms import PANDA
+from hecbench_datasets.reading.robots import NO_START, urdf_beside
 from hecbench_datasets.reading.sources import (
     files_in,
     finite,
@@ -22,7 +28,7 @@ from hecbench_datasets.reading.sources import (
     zip_names,
 )
 
-_JOINTS = tuple(f"panda_joint{i}" for i in range(1, 8))
+_TRUTH = "Tc_c2b.txt"
 
 
 def _layout(path: Path) -> tuple[Path, str] | None:
@@ -72,17 +78,30 @@ def load(path: Path) -> Recording:
     rows = [table(read(f"qpos/{i}.txt").decode("utf-8", "replace"), f"{place}: qpos/{i}.txt") for i in ids]
     joints = finite([row.ravel()[:7] for row in rows], f"{place}: qpos", (-1, 7))
     K = finite(table(read("K.txt").decode("utf-8", "replace"), f"{place}: K.txt"), f"{place}: K.txt", (3, 3))
+    truth = None
+    if (_TRUTH in names) if not place.is_dir() else (place / _TRUTH).is_file():
+        told = table(read(_TRUTH).decode("utf-8", "replace"), f"{place}: {_TRUTH}")
+        truth = se3.inverse(finite(told, f"{place}: {_TRUTH}", (4, 4)))
+    folder = path if path.is_dir() else path.parent
+    urdf, notes = urdf_beside(folder, "a Franka Panda")
     images, masks = pictures("color", "RGB"), pictures("mask", "L")
     return Recording(
         name="easyhec_" + (prefix.rstrip("/") or place.resolve().name),
         mounting=Mounting.EYE_TO_HAND,
         sample_ids=tuple(ids),
-        robot=RobotDescription(base_link="panda_link0", flange_link="panda_hand", joint_names=_JOINTS),
+        robot=RobotDescription(
+            urdf=urdf,
+            base_link=PANDA.base_link,
+            flange_link=PANDA.flange_link,
+            joint_names=PANDA.joint_names,
+        ),
+        truth_parent_T_camera=truth,
         camera=CameraModel(*_size(images, place), K),
         joints_rad=joints,
         images=images,
         masks=masks,
-        folder=path if path.is_dir() else path.parent,
+        folder=folder,
+        notes=(*notes, NO_START.format(path)),
     )
 
 

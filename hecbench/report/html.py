@@ -13,7 +13,9 @@ from hecbench.estimate import Estimate, best_first
 from hecbench.evidence import Evidence
 from hecbench.report.figures import figures
 from hecbench.report.recording_figures import agreement_figure, overlays, residual_figure, scene_figure
-from hecbench.report.render_sections import sections as sections_of_renderers
+from hecbench.report.section import Section
+from hecbench.report.studies import is_study
+from hecbench.report.studies import sections as sections_of_studies
 from hecbench.report.tables import Group, groups, table
 from hecbench.report.trials import sections as sections_of_trials
 from hecbench.trial_record import TrialRecord
@@ -72,8 +74,9 @@ def page(
     environment = Environment(
         loader=PackageLoader("hecbench.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
-    sections = [_section(group, evidence) for group in groups(estimates)]
-    sections += sections_of_renderers(estimates) + sections_of_trials(trials, folder)
+    sections = sections_of_studies(estimates) + sections_of_trials(trials, folder)
+    sections += [_section(group, evidence) for group in groups(estimates)]
+    sections.sort(key=lambda section: section.folded)
     return environment.get_template("report.html.j2").render(
         sections=sections,
         damage=damage,
@@ -89,24 +92,22 @@ def page(
     )
 
 
-def _section(group: Group, evidence: Callable[[str], Evidence | None]) -> dict[str, Any]:
-    """What the page shows of one level or recording."""
-    section: dict[str, Any] = {
-        "table": table(group),
-        "figures": figures(group),
-        "commands": _values(group.estimates, "command"),
-        "findings": [],
-        "overlays": [],
-    }
+def _section(group: Group, evidence: Callable[[str], Evidence | None]) -> Section:
+    """What the page shows of one level or recording; levels of a study are told there and folded here."""
+    drawn = figures(group)
     shown = None if group.is_level else evidence(str(group.estimates[0].provenance.get("recording_sha256")))
+    best = best_first(group.estimates)
     if shown is not None:
-        ordered = best_first(group.estimates)
-        best = ordered[0]
-        drawn = (scene_figure(shown, best), residual_figure(shown, best), agreement_figure(shown, ordered))
-        section["figures"] += [figure for figure in drawn if figure is not None]
-        section["findings"] = shown.findings
-        section["overlays"] = overlays(shown, best)
-    return section
+        more = (scene_figure(shown, best[0]), residual_figure(shown, best[0]), agreement_figure(shown, best))
+        drawn += [figure for figure in more if figure is not None]
+    return Section(
+        table(group),
+        figures=drawn,
+        commands=_values(group.estimates, "command"),
+        findings=shown.findings if shown else (),
+        overlays=overlays(shown, best[0]) if shown else (),
+        folded=group.is_level and is_study(group.estimates[0].suite),
+    )
 
 
 def _values(estimates: Sequence[Estimate], name: str) -> list[str]:

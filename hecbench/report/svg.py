@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -13,16 +14,33 @@ DARK, LIGHT, RED = "#12355b", "#8fa6c2", "#d1495b"
 COLOURS = (DARK, RED, "#2e8b57", "#edae49", "#7b4fa3", "#00798c", "#8c564b", "#5c6670")
 
 
-def panel(width_inch: float, height_inch: float, columns: int) -> tuple[Figure, list[Axes]]:
-    """A figure with axes side by side."""
+def panel(width_inch: float, height_inch: float, columns: int, rows: int = 1) -> tuple[Figure, list[Axes]]:
+    """A figure with axes side by side, in rows of that height."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width_inch, height_inch), layout="constrained")
-    axes = [figure.add_subplot(1, columns, column + 1) for column in range(columns)]
+    figure = Figure(figsize=(width_inch, height_inch * rows), layout="constrained")
+    axes = [figure.add_subplot(rows, columns, place + 1) for place in range(rows * columns)]
     for each in axes:
         each.spines[["top", "right"]].set_visible(False)
         each.title.set_fontsize(10)
     return figure, axes
+
+
+def legend_beside(axes: Sequence[Axes]) -> None:
+    """One legend for all, right of the last: every label once."""
+    handles = {
+        label: handle
+        for view in axes
+        for handle, label in zip(*view.get_legend_handles_labels(), strict=True)
+    }
+    axes[-1].legend(
+        handles.values(),
+        handles.keys(),
+        loc="center left",
+        bbox_to_anchor=(1.01, 0.5),
+        frameon=False,
+        fontsize=8,
+    )
 
 
 def svg(figure: Figure) -> str:

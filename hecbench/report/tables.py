@@ -10,22 +10,22 @@ import numpy as np
 
 from hecbench import statistics
 from hecbench.estimate import Estimate, Status, best_first
+from hecbench.report.cells import ABSENT, NO_ANSWER, interval, number, percent
 from hecbench.statistics import Interval
 
 SUCCESS_MM, SUCCESS_RAD = 5.0, 0.01
-_NO_ANSWER = 1e12
-"""Stands for the error of a run without an answer, so that medians count every run."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """Cells as text. The first `left` columns are words, the rest numbers."""
+    """Cells as text. The first `left` columns are words, the rest numbers; `looks` are names of styles, one a row."""
 
     title: str
     header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     notes: tuple[str, ...] = field(default=())
     left: int = 1
+    looks: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def table(group: Group) -> Table:
 
 def error_mm(estimate: Estimate, name: str = "tre_mm") -> float:
     """One error of a run; very large for a run without an answer, NaN where it was not measured."""
-    return float((estimate.errors or {}).get(name, np.nan)) if estimate.status is Status.OK else _NO_ANSWER
+    return float((estimate.errors or {}).get(name, np.nan)) if estimate.status is Status.OK else NO_ANSWER
 
 
 def succeeded(estimate: Estimate) -> bool:
@@ -93,12 +93,12 @@ def _level_table(group: Group) -> Table:
                 solver,
                 str(ranks[solver]),
                 f"{len(answered)} of {len(runs)}",
-                _interval(medians[solver]),
-                _number(np.mean([error_mm(run) for run in answered]) if answered else np.nan),
-                _number(np.median([error_mm(run, "translation_error_mm") for run in runs])),
-                _number(np.median([error_mm(run, "rotation_error_deg") for run in runs])),
-                f"{successes}/{len(runs)} {_percent(statistics.wilson(successes, len(runs)))}",
-                _number(1e3 * np.median([run.seconds for run in runs])),
+                interval(medians[solver]),
+                number(np.mean([error_mm(run) for run in answered]) if answered else np.nan),
+                number(np.median([error_mm(run, "translation_error_mm") for run in runs])),
+                number(np.median([error_mm(run, "rotation_error_deg") for run in runs])),
+                f"{successes}/{len(runs)} {percent(statistics.wilson(successes, len(runs)))}",
+                number(1e3 * np.median([run.seconds for run in runs])),
             )
         )
     return Table(
@@ -128,23 +128,25 @@ def _recording_table(title: str, estimates: Sequence[Estimate]) -> Table:
     estimates = best_first(estimates)
     columns: list[tuple[str, Callable[[Estimate], str]]] = [
         ("held-out px [95 %]", lambda e: _held_out(e, "reprojection_px")),
-        ("median px", lambda e: _number((e.held_out or {}).get("reprojection_px_median"))),
+        ("median px", lambda e: number((e.held_out or {}).get("reprojection_px_median"))),
         ("held-out mm [95 %]", lambda e: _held_out(e, "target_mm")),
-        ("median mm", lambda e: _number((e.held_out or {}).get("target_mm_median"))),
-        ("held-out deg", lambda e: _number((e.held_out or {}).get("target_deg"))),
+        ("median mm", lambda e: number((e.held_out or {}).get("target_mm_median"))),
+        ("held-out deg", lambda e: number((e.held_out or {}).get("target_deg"))),
         ("held-out mask IoU [95 %]", lambda e: _held_out(e, "mask_iou")),
-        ("mask IoU", lambda e: _number(e.diagnostics.get("mask_iou"))),
-        ("masks IoU with given", lambda e: _number(e.diagnostics.get("masks_iou_given"))),
-        ("masks IoU with truth", lambda e: _number((e.errors or {}).get("masks_iou_truth"))),
-        ("spread deg", lambda e: _number(e.diagnostics.get("target_spread_deg"))),
-        ("spread mm", lambda e: _number(e.diagnostics.get("target_spread_mm"))),
-        ("TRE mm", lambda e: _number((e.errors or {}).get("tre_mm"))),
-        ("camera centre mm", lambda e: _number((e.errors or {}).get("translation_error_mm"))),
-        ("rotation deg", lambda e: _number((e.errors or {}).get("rotation_error_deg"))),
-        ("ms", lambda e: _number(1e3 * e.seconds)),
+        ("mask IoU", lambda e: number(e.diagnostics.get("mask_iou"))),
+        ("masks IoU with given", lambda e: number(e.diagnostics.get("masks_iou_given"))),
+        ("masks IoU with truth", lambda e: number((e.errors or {}).get("masks_iou_truth"))),
+        ("spread deg", lambda e: number(e.diagnostics.get("target_spread_deg"))),
+        ("spread mm", lambda e: number(e.diagnostics.get("target_spread_mm"))),
+        ("keypoints median px", lambda e: number(e.diagnostics.get("keypoint_median_px"))),
+        ("PCK @50 px", lambda e: number(e.diagnostics.get("pck_50_px"))),
+        ("TRE mm", lambda e: number((e.errors or {}).get("tre_mm"))),
+        ("camera centre mm", lambda e: number((e.errors or {}).get("translation_error_mm"))),
+        ("rotation deg", lambda e: number((e.errors or {}).get("rotation_error_deg"))),
+        ("ms", lambda e: number(1e3 * e.seconds)),
     ]
     cells = {name: [render(e) for e in estimates] for name, render in columns}
-    shown = [name for name, _ in columns if any(cell != _ABSENT for cell in cells[name])]
+    shown = [name for name, _ in columns if any(cell != ABSENT for cell in cells[name])]
     rows = tuple(
         (e.solver, str(e.status), rank, *(cells[name][i] for name in shown))
         for i, (e, rank) in enumerate(zip(estimates, _held_out_ranks(estimates), strict=True))
@@ -164,8 +166,8 @@ def _held_out_ranks(estimates: Sequence[Estimate]) -> list[str]:
         if known:
             ranks = statistics.shared_ranks([_held_out_interval(estimates[i], name) for i in known])
             texts = dict(zip(known, map(str, ranks), strict=True))
-            return [texts.get(i, _ABSENT) for i in range(len(estimates))]
-    return [_ABSENT] * len(estimates)
+            return [texts.get(i, ABSENT) for i in range(len(estimates))]
+    return [ABSENT] * len(estimates)
 
 
 def _reasons(estimates: Iterable[Estimate]) -> list[str]:
@@ -180,25 +182,8 @@ def _reasons(estimates: Iterable[Estimate]) -> list[str]:
     ]
 
 
-_ABSENT = "-"
-
-
-def _number(value: float | np.floating | None) -> str:
-    if value is None or np.isnan(value):
-        return _ABSENT
-    return "∞" if value >= _NO_ANSWER / 2 else f"{value:.3g}" if value < 1000 else f"{value:.0f}"
-
-
-def _interval(interval: Interval) -> str:
-    return f"{_number(interval.value)} [{_number(interval.low)}, {_number(interval.high)}]"
-
-
-def _percent(interval: Interval) -> str:
-    return f"[{100 * interval.low:.0f}, {100 * interval.high:.0f}] %"
-
-
 def _held_out(estimate: Estimate, name: str) -> str:
-    return _interval(_held_out_interval(estimate, name)) if name in (estimate.held_out or {}) else _ABSENT
+    return interval(_held_out_interval(estimate, name)) if name in (estimate.held_out or {}) else ABSENT
 
 
 def _held_out_interval(estimate: Estimate, name: str) -> Interval:

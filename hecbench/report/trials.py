@@ -11,16 +11,15 @@ from collections.abc import Iterable, Sequence
 from html import escape
 from itertools import groupby
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from hecbench import files, statistics
+from hecbench.report.cells import ABSENT
+from hecbench.report.section import Section
 from hecbench.report.svg import COLOURS, panel, svg
 from hecbench.report.tables import Table
 from hecbench.trial_record import TASKS, Outcome, TrialRecord, picture_name
-
-_ABSENT = "-"
 
 PAPER_PCT = {
     "ur5e": {
@@ -55,24 +54,20 @@ def tables(trials: Sequence[TrialRecord]) -> list[Table]:
     return found
 
 
-def sections(trials: Sequence[TrialRecord], folder: Path | None = None) -> list[dict[str, Any]]:
+def sections(trials: Sequence[TrialRecord], folder: Path | None = None) -> list[Section]:
     """What the HTML page shows of trials, one section for each table; the figures follow the first of an arm, and
     the pictures in the folder the first of its clearances.
     """
-    found: list[dict[str, Any]] = []
+    found: list[Section] = []
     shown: set[str] = set()
     for (robot, _), group in _grouped(trials):
         first, *others = tables(group)
         commands = sorted({str(t.provenance["command"]) for t in group if t.provenance.get("command")})
         drawn = [] if folder is None or robot in shown else pictures(folder, robot)
         shown.add(robot)
-        found.append(_section(first, figures(group) + drawn, commands))
-        found += [_section(other, [], []) for other in others]
+        found.append(Section(first, figures=figures(group) + drawn, commands=commands))
+        found += [Section(other) for other in others]
     return found
-
-
-def _section(table: Table, drawn: list[str], commands: list[str]) -> dict[str, Any]:
-    return {"table": table, "figures": drawn, "commands": commands, "findings": [], "overlays": []}
 
 
 def pictures(folder: Path, robot: str) -> list[str]:
@@ -151,9 +146,9 @@ def _success_table(robot: str, clearance_mm: float, trials: Sequence[TrialRecord
 
 def _task_cells(robot: str, method: str, trials: Sequence[TrialRecord]) -> tuple[str, ...]:
     paper = PAPER_PCT.get(robot, {}).get(method)
-    shown = _ABSENT if paper is None or not trials else f"{paper[TASKS.index(trials[0].task)]:g}"
+    shown = ABSENT if paper is None or not trials else f"{paper[TASKS.index(trials[0].task)]:g}"
     if not trials:
-        return (_ABSENT,) * 5
+        return (ABSENT,) * 5
     successes = [trial.outcome is Outcome.SUCCESS for trial in trials]
     wilson = statistics.wilson(sum(successes), len(successes))
     cluster = statistics.cluster_bootstrap(successes, [trial.calibration for trial in trials])
@@ -179,7 +174,7 @@ def _paired_table(robot: str, clearance_mm: float, trials: Sequence[TrialRecord]
             pairs = [(first[key], second[key]) for key in shared]
             wins, losses = sum(a and not b for a, b in pairs), sum(b and not a for a, b in pairs)
             p = statistics.paired_success_p(*zip(*pairs, strict=True)) if pairs else None
-            cells += [_ABSENT, _ABSENT] if p is None else [f"{wins} : {losses}", f"{p:.2g}"]
+            cells += [ABSENT, ABSENT] if p is None else [f"{wins} : {losses}", f"{p:.2g}"]
         rows.append((method, *cells))
     header = ("method", *(f"{task} {column}" for task in TASKS for column in ("won : lost", "p")))
     note = (
@@ -248,7 +243,7 @@ def _outcomes(trials: Iterable[TrialRecord]) -> dict[tuple[str, int, int], bool]
 
 def _median(values: Iterable[float | None]) -> str:
     known = [value for value in values if value is not None]
-    return f"{np.median(known):.3g}" if known else _ABSENT
+    return f"{np.median(known):.3g}" if known else ABSENT
 
 
 def _range(interval: statistics.Interval) -> str:

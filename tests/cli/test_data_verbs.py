@@ -46,6 +46,12 @@ def test_import_and_export(hecbench, refused, shared, tmp_path):
     refused(hecbench("import", tmp_path / "nowhere", tmp_path / "x"), "nowhere")
     assert not (tmp_path / "x").exists()
 
+    urdf = shared / "data" / "robots" / "denso_vs060" / "vs060_description" / "vs060.urdf"
+    easyhec = shared / "data" / "easyhec_franka"
+    refused(hecbench("import", easyhec, tmp_path / "x", "--urdf", urdf), "has no joint 'panda_joint1'")
+    refused(hecbench("import", easyhec, tmp_path / "x", "--urdf", tmp_path / "no.urdf"), "no.urdf")
+    assert not (tmp_path / "x").exists()
+
     assert hecbench("solve", tmp_path / "cell", "--solver", "shah", "--out", tmp_path).returncode == 0
     estimate = tmp_path / "shah.json"
     line = hecbench("export", estimate, "--to", "ros", "--child", "camera_link")

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from hecbench_datasets import easyhec
 
+from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.recording import Mounting
 
@@ -47,3 +48,23 @@ def test_a_damaged_archive_is_not_recognised_and_a_missing_file_named(archive, t
     (tmp_path / "K.txt").write_text("1 0 0\n0 1 0\n0 0 1\n")
     with pytest.raises(InputError, match=r"000000\.txt: line 3"):
         easyhec.load(tmp_path)
+
+
+def test_truth_and_urdf_in_the_folder_are_taken(archive, tmp_path):
+    with zipfile.ZipFile(archive) as content:
+        content.extractall(tmp_path)
+    folder = tmp_path / "offline_example"
+    bare = easyhec.load(folder)
+    assert bare.truth_parent_T_camera is None
+    assert any("--urdf" in note for note in bare.notes)
+    camera_T_base = se3.exp(np.array([0.1, 0.2, 0.3, 0.4, 0.5, 1.0]))
+    np.savetxt(folder / "Tc_c2b.txt", camera_T_base)
+    (folder / "panda.urdf").write_text('<robot name="panda"><link name="panda_link0"/></robot>')
+    recording = easyhec.load(folder)
+    np.testing.assert_allclose(recording.truth_parent_T_camera, se3.inverse(camera_T_base), atol=1e-9)
+    assert recording.robot.urdf == folder / "panda.urdf"
+    (folder / "other.urdf").write_text("<robot/>")
+    assert easyhec.load(folder).robot.urdf is None
+    (folder / "Tc_c2b.txt").write_text("1 2 3\n")
+    with pytest.raises(InputError, match=r"Tc_c2b\.txt: expected numbers of shape"):
+        easyhec.load(folder)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hecbench import conformance, recording_io, registry, runner, store
+from hecbench import conformance, recording_io, registry, runner, se3, store
 from hecbench.errors import InputError, Refusal, SolverFailure
 from hecbench.estimate import Estimate, Status
 from hecbench.recording import Mounting
@@ -69,6 +69,29 @@ def test_solvers_see_neither_truth_nor_global_seed_and_are_labelled(exact_rig):
     )
     assert first.provenance["recording_sha256"] == exact_rig.sha256
     assert replace(first, seconds=0).to_json() == replace(second, seconds=0).to_json()
+
+
+def test_start_and_truth_are_kept_of_every_run(exact_rig):
+    """Also of one without an answer, so that a report can tell what starts failed."""
+    start = exact_rig.truth_parent_T_camera @ se3.from_rotvec([0.1, 0, 0], [0.2, 0, 0])
+    begun = replace(exact_rig, initial_parent_T_camera=start)
+    (estimate,) = runner.solve(begun, [spec(None, {Need.MASKS})])
+    assert estimate.status is Status.REFUSED
+    np.testing.assert_allclose(estimate.provenance["initial_parent_T_camera"], start)
+    np.testing.assert_allclose(estimate.provenance["truth_parent_T_camera"], exact_rig.truth_parent_T_camera)
+    (without,) = runner.solve(begun.without_truth(), [spec(None, {Need.MASKS})])
+    assert "truth_parent_T_camera" not in without.provenance
+
+
+def test_facts_of_an_item_come_with_its_results():
+    from hecbench_datasets import synthetic
+
+    task = Task(("park",), suite="synthetic", level="mismatch_3", index=2)
+    (estimate,), _ = runner.execute(task, Options(seed=1))
+    floor_mm = synthetic.correspondence_floor_mm("mismatch_3", 2, 1)
+    assert estimate.provenance["facts"] == {"correspondence_floor_mm": floor_mm}
+    (estimate,), _ = runner.execute(replace(task, level="LP"), Options(seed=1))
+    assert "facts" not in estimate.provenance
 
 
 def test_an_unseen_target_is_a_reason_not_an_error(exact_rig):

@@ -1,0 +1,58 @@
+"""The files that a URDF consists of: its meshes found, and all copied together."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from xml.etree import ElementTree
+
+from hecbench import files
+from hecbench.errors import InputError
+
+_PACKAGE = "package://"
+
+
+def find_mesh(filename: str, urdf: Path) -> Path:
+    """The mesh file: relative to the URDF's folder or one above it, with or without a package's name."""
+    relative = Path(filename.removeprefix(_PACKAGE).removeprefix("file://"))
+    tails = [Path(*relative.parts[skip:]) for skip in range(len(relative.parts))]
+    places = (urdf.parent, *urdf.parent.absolute().parents[:2])
+    for place in places:
+        for tail in tails if filename.startswith(_PACKAGE) else [relative]:
+            if (place / tail).is_file():
+                return place / tail
+    raise InputError(f"{urdf}: mesh '{filename}' is not there: put it beside the URDF or correct its path")
+
+
+def copy(urdf: Path, folder: Path) -> Path:
+    """Write the URDF with its visual meshes and their material files into a folder; returns the copy.
+
+    Collision shapes are left out: nothing here uses them. Meshes of one folder stay together.
+
+    Raises:
+        InputError: the URDF is no XML, or a mesh is not there.
+    """
+    try:
+        root = ElementTree.fromstring(files.read_bytes(urdf))
+    except ElementTree.ParseError as error:
+        raise InputError(f"{urdf}: not a readable URDF: {error}") from error
+    for link in root.iter("link"):
+        for shape in link.findall("collision"):
+            link.remove(shape)
+    places: dict[Path, str] = {}
+    for mesh in root.iter("mesh"):
+        source = find_mesh(mesh.get("filename", ""), urdf)
+        place = places.setdefault(source.parent, f"meshes/{len(places)}")
+        for path in (source, *_materials(source)):
+            files.write_bytes(folder / place / path.name, files.read_bytes(path))
+        mesh.set("filename", f"{place}/{source.name}")
+    files.write_bytes(folder / urdf.name, ElementTree.tostring(root))
+    return folder / urdf.name
+
+
+def _materials(mesh: Path) -> list[Path]:
+    """The material files beside an OBJ file that it names."""
+    if mesh.suffix.lower() != ".obj":
+        return []
+    lines = files.read_bytes(mesh).decode("utf-8", "replace").splitlines()
+    named = {word for line in lines if line.startswith("mtllib ") for word in line.split()[1:]}
+    return sorted(mesh.parent / name for name in named if (mesh.parent / name).is_file())

@@ -1,0 +1,185 @@
+"""Keypoints on the robot: how far from their pixels, and from their places, a calibration puts them.
+
+PCK and its area follow the protocol of the Baxter set (Lu, Richter and Yip 2020, "Robust keypoint detection and pose
+estimation of robot manipulators with self-occlusions"): one keypoint, the end-effector. ADD is the mean distance of
+keypoints in the camera's frame; its area to 0.1 m is that of Lee et al. 2020, "Camera-to-robot pose estimation from a
+single image" (DREAM).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hecbench import se3
+from hecbench.estimate import Estimate
+from hecbench.recording import Recording
+from hecbench.registry import hookimpl
+from hecbench.robot import load_robot
+from hecbench.specs import Column, EvaluatorSpec, Into, Need
+from hecbench.targets import PointsTarget
+from hecbench_plugins.target_poses import MINIMUM_POINTS, project
+
+Array = NDArray[np.float64]
+
+THRESHOLDS_PX = (20, 30, 40, 50, 100, 150, 200)
+_AREA_PX, _BAXTER_AREA_MM, _DREAM_AREA_MM = 200, 400, 100
+
+
+def has_keypoints(recording: Recording) -> bool:
+    """Whether the target is points on the flange (or the base, eye in hand) that no method can take a pose from.
+
+    Their frame is that link's: other_T_target is the identity. Four points or more would be a target to calibrate by.
+    """
+    target = recording.target
+    return (
+        isinstance(target, PointsTarget)
+        and len(target.points_m) < MINIMUM_POINTS
+        and {Need.CORNERS, Need.INTRINSICS} <= recording.offers()
+        and recording.base_T_flange is not None
+    )
+
+
+def pixel_errors(estimate: Estimate, recording: Recording) -> tuple[Array, NDArray[np.intp]]:
+    """Distances (K,) px of the keypoints seen, infinite behind the camera, and the sample (K,) of each."""
+    camera, corners, target = estimate.camera or recording.camera, recording.corners_px, recording.target
+    assert camera is not None
+    assert corners is not None
+    assert target is not None
+    assert estimate.parent_T_camera is not None
+    camera_T_target = se3.inverse(estimate.parent_T_camera) @ recording.hand_poses()
+    placed = np.asarray(np.isfinite(camera_T_target).all((1, 2)))
+    samples, points = np.nonzero(np.isfinite(corners).all(-1) & placed[:, None])
+    in_camera = se3.transform_points(camera_T_target, target.points_m)[samples, points]
+    in_front = in_camera[:, 2] > 0
+    errors = np.full(len(samples), np.inf)
+    if in_front.any():
+        predicted = project(camera, np.eye(4), in_camera[in_front])
+        errors[in_front] = np.linalg.norm(predicted - corners[samples, points][in_front], axis=1)
+    return errors, samples
+
+
+def pck(
+    estimate: Estimate,
+    recording: Recording,
+    *,
+    solve: Callable[[Recording], Estimate],
+    rng: np.random.Generator,
+) -> Mapping[str, Any]:
+    """Share of keypoints nearer than each threshold, and the area below that share over 0 to 199 px.
+
+    A keypoint behind the camera is infinitely far, and so is then the mean. `keypoint_poses` counts the different
+    robot poses among the samples: pictures of one pose are no independent trials.
+    """
+    errors, samples = pixel_errors(estimate, recording)
+    if not len(errors):
+        return {}
+    assert recording.base_T_flange is not None
+    poses = np.unique(recording.base_T_flange[np.unique(samples)].round(9), axis=0)
+    return {
+        "keypoints": len(errors),
+        "keypoint_poses": len(poses),
+        "keypoint_mean_px": float(errors.mean()),
+        "keypoint_median_px": float(np.median(errors)),
+        "keypoint_auc": area(errors, _AREA_PX),
+        **{f"pck_{threshold}_px": float((errors < threshold).mean()) for threshold in THRESHOLDS_PX},
+    }
+
+
+def area(errors: Array, thresholds: int) -> float:
+    """Mean over the thresholds 0, 1, ... of the share of errors below each."""
+    return float((errors[:, None] < np.arange(thresholds)).mean())
+
+
+def add(
+    estimate: Estimate,
+    recording: Recording,
+    *,
+    solve: Callable[[Recording], Estimate],
+    rng: np.random.Generator,
+) -> Mapping[str, float]:
+    """Mean distance of the recording's keypoints from where the truth has them, in the camera's frame, and its area."""
+    assert recording.target is not None
+    hand = recording.hand_poses()
+    known = np.isfinite(hand).all((1, 2))
+    points = se3.transform_points(hand[known], recording.target.points_m)
+    distances_mm = distances_to_truth_mm(estimate, recording, points)
+    return {"add_mm": float(distances_mm.mean()), "add_auc_400_mm": area(distances_mm, _BAXTER_AREA_MM)}
+
+
+def links_add(
+    estimate: Estimate,
+    recording: Recording,
+    *,
+    solve: Callable[[Recording], Estimate],
+    rng: np.random.Generator,
+) -> Mapping[str, float]:
+    """The same of the origins of the links: the base, those behind each joint, the flange; area to 0.1 m."""
+    robot, joints = recording.robot, recording.joints_rad
+    assert robot is not None
+    assert joints is not None
+    model = load_robot(robot.urdf or str(robot.model), meshes=False)
+    names = robot.joint_names or model.joint_names
+    behind = {joint.child for joint in model.joints if joint.name in names}
+    links = sorted({robot.base_link, robot.flange_link, *behind})
+    poses = model.link_poses(joints[np.isfinite(joints).all(1)], names, frame=recording.parent_link)
+    points = poses[:, [model.link_index(link) for link in links], :3, 3]
+    distances_mm = distances_to_truth_mm(estimate, recording, points)
+    return {
+        "links_add_mm": float(distances_mm.mean()),
+        "links_add_auc_100_mm": float(np.maximum(0, 1 - distances_mm / _DREAM_AREA_MM).mean()),
+    }
+
+
+def distances_to_truth_mm(estimate: Estimate, recording: Recording, points: Array) -> Array:
+    """For each sample the mean distance (N,) mm, in the camera's frame, of points (N, P, 3) m of the parent's frame."""
+    assert estimate.parent_T_camera is not None
+    assert recording.truth_parent_T_camera is not None
+    estimated, true = (
+        se3.transform_points(se3.inverse(pose), points)
+        for pose in (estimate.parent_T_camera, recording.truth_parent_T_camera)
+    )
+    return np.asarray(1e3 * np.linalg.norm(estimated - true, axis=-1).mean(1))
+
+
+@hookimpl
+def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
+    """This file's rulers."""
+    yield EvaluatorSpec(
+        name="pck",
+        summary="keypoints of the robot predicted in the picture (PCK)",
+        columns=(
+            Column("keypoints", "", None),
+            Column("keypoint_poses", "", None),
+            Column("keypoint_mean_px", "px"),
+            Column("keypoint_median_px", "px"),
+            Column("keypoint_auc", "", False),
+            *(Column(f"pck_{threshold}_px", "", False) for threshold in THRESHOLDS_PX),
+        ),
+        factory=lambda: pck,
+        into=Into.DIAGNOSTICS,
+        applies=has_keypoints,
+    )
+    yield EvaluatorSpec(
+        name="add",
+        summary="keypoints of the robot away from where the truth has them (ADD)",
+        columns=(Column("add_mm", "mm"), Column("add_auc_400_mm", "", False)),
+        factory=lambda: add,
+        into=Into.ERRORS,
+        applies=lambda recording: recording.truth_parent_T_camera is not None and has_keypoints(recording),
+    )
+    yield EvaluatorSpec(
+        name="links_add",
+        summary="origins of the robot's links away from where the truth has them (ADD)",
+        columns=(Column("links_add_mm", "mm"), Column("links_add_auc_100_mm", "", False)),
+        factory=lambda: links_add,
+        into=Into.ERRORS,
+        applies=lambda recording: (
+            recording.truth_parent_T_camera is not None
+            and {Need.JOINTS, Need.ROBOT_MODEL} <= recording.offers()
+            and (recording.target is None or has_keypoints(recording))
+        ),
+    )
