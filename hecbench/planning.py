@@ -13,7 +13,7 @@ from hecbench.errors import InputError
 from hecbench.recording import Recording, RobotDescription
 from hecbench.robot import load_robot
 from hecbench.runner import Task
-from hecbench.specs import Kind, SolverSpec, SuiteSpec
+from hecbench.specs import Kind, SegmenterSpec, SolverSpec, SuiteSpec
 
 
 def adjusted(recording: Recording, views: int | None, init: Path | None, seed: int) -> Recording:
@@ -62,6 +62,8 @@ def solvers_for(names: Sequence[str], recording: Recording, segmenter: str | Non
         InputError: no solver or segmenter is called so.
     """
     known = registry.load()
+    if segmenter is not None:
+        known.get(Kind.SEGMENTER, segmenter, SegmenterSpec)
     if names:
         return [known.get(Kind.SOLVER, name, SolverSpec) for name in dict.fromkeys(names)]
     offers = runner.will_offer(recording, segmenter)

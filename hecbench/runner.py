@@ -101,14 +101,9 @@ def prepare(recording: Recording) -> Recording:
 
 
 def will_offer(recording: Recording, segmenter: str | None = None) -> frozenset[Need]:
-    """What the recording will offer once it is prepared and has the segmenter's masks, found without either.
-
-    Raises:
-        InputError: no segmenter is called so.
-    """
+    """What the recording will offer once it is prepared and has the segmenter's masks, found without either."""
     offers = recording.offers()
     if segmenter is not None:
-        registry.load().get(Kind.SEGMENTER, segmenter, SegmenterSpec)
         offers |= {Need.MASKS}
     observers = registry.load().ready(Kind.OBSERVER, ObserverSpec)
     given = {observer.gives for observer in observers if observer.applies(recording)}

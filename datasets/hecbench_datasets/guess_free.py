@@ -63,7 +63,7 @@ def scene(level: str, index: int, seed: int) -> Scene:
     camera = CameraModel(WIDTH, HEIGHT, _intrinsics(WIDTH, HEIGHT))
     wide = Renderer(mesh, _intrinsics(_CANVAS * WIDTH, _CANVAS * HEIGHT), _CANVAS * WIDTH, _CANVAS * HEIGHT)
     while True:
-        joints = np.array([_joints(rng) for _ in range(LEVELS[level])])
+        joints = np.array([working_joints(rng) for _ in range(LEVELS[level])])
         camera_T_base = _camera(middle(joints[0]), rng)
         if all(share_in_view(wide, camera_T_base, view) >= LEAST_IN_VIEW for view in joints):
             return Scene(camera_T_base, joints, camera)
@@ -98,7 +98,8 @@ def _intrinsics(width: int, height: int) -> Array:
     return np.array([[FOCAL_PX, 0, (width - 1) / 2], [0, FOCAL_PX, (height - 1) / 2], [0, 0, 1]])
 
 
-def _joints(rng: np.random.Generator) -> Array:
+def working_joints(rng: np.random.Generator) -> Array:
+    """Joints (6,) drawn like those of the suite; see the module's docstring."""
     model, _ = robot_and_mesh()
     links = [model.link_index(name) for name in ("forearm_link", "wrist_1_link", "wrist_2_link", FLANGE)]
     while True:

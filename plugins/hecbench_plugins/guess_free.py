@@ -252,7 +252,8 @@ class GuessFree:
     recording does not determine the answer.
 
     Attributes:
-        sphere: the cameras that are tried.
+        spheres: the cameras that are tried, one sphere after the other.
+        sure_overlap: agreement with the masks from which on no further sphere is tried.
         solver: the method that is given the starts.
         least_overlap: agreement with the masks below which no pose on the sphere explains them.
         rival_margin: how much less than the best a rival overlaps at most.
@@ -261,7 +262,8 @@ class GuessFree:
         same_overlap, same_noise: two ends are equally good within this difference of overlap and ratio of noise.
     """
 
-    sphere: ViewSphere = ViewSphere()
+    spheres: tuple[ViewSphere, ...] = (ViewSphere(), ViewSphere(spacing_deg=8.0))
+    sure_overlap: float = 0.85
     solver: RenderGN = field(default_factory=RenderGN)
     least_overlap: float = 0.5
     rival_margin: float = 0.04
@@ -287,10 +289,8 @@ class GuessFree:
 
     def _by_masks(self, recording: Recording, rng: np.random.Generator) -> Estimate:
         _, views = prepare(recording)
-        robot = recording.robot
-        assert robot is not None
         trace = stages.Trace()
-        found = starts(robot.urdf or str(robot.model), views, self.sphere, trace)
+        found = self._found(recording, views, trace)
         if found[0].overlap < self.least_overlap:
             raise SolverFailure(
                 f"no camera on the view sphere explains the masks: the best overlaps by {found[0].overlap:.2f}"
@@ -311,10 +311,25 @@ class GuessFree:
             diagnostics={**best.diagnostics, **searched},
         )
 
+    def _found(self, recording: Recording, views: Sequence[View], trace: stages.Trace) -> list[Start]:
+        """The starts of the sphere that explains the masks best; the first good one ends the search."""
+        robot = recording.robot
+        assert robot is not None
+        best: list[Start] = []
+        for sphere in self.spheres:
+            found = starts(robot.urdf or str(robot.model), views, sphere, trace)
+            if not best or found[0].overlap > best[0].overlap:
+                best = found
+            if best[0].overlap >= self.sure_overlap:
+                break
+        return best
+
     def _without_masks(self, recording: Recording, rng: np.random.Generator) -> Estimate:
         from hecbench_plugins.maskless.solver import Maskless
 
-        return Maskless(free=replace(self.sphere, spacing_deg=_SPACING_WITHOUT_MASKS_DEG))(recording, rng=rng)
+        return Maskless(free=replace(self.spheres[0], spacing_deg=_SPACING_WITHOUT_MASKS_DEG))(
+            recording, rng=rng
+        )
 
     def _rivals(self, found: Sequence[Start]) -> list[Start]:
         near = [start for start in found if start.overlap >= found[0].overlap - self.rival_margin]
