@@ -1,0 +1,188 @@
+"""Adam on a pose, as the first-order methods run it, and what is told of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import torch
+from numpy.typing import NDArray
+from torch import Tensor
+
+from hecbench import se3
+from hecbench.errors import SolverFailure
+from hecbench.estimate import Estimate, Status, Termination
+from hecbench_plugins import render_evidence as evidence
+from hecbench_plugins import render_stages as stages
+from hecbench_plugins.first_order.drawing import Drawer
+from hecbench_plugins.first_order.poses import PoseNumbers
+from hecbench_plugins.first_order.rendered import rendered
+from hecbench_plugins.render_views import View
+
+Array = NDArray[np.float64]
+
+_TOLD_STEPS = 40
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What an objective says of one set of pictures.
+
+    Attributes:
+        loss: to be lowered.
+        stage: name of the stage that the run is in.
+        turns: whether the rotation takes part.
+        rank: loss by which the best iterate is chosen among those of the same `round`; None: not a candidate.
+        round: pictures of different rounds cannot be compared; a later one replaces what was best.
+    """
+
+    loss: Tensor
+    stage: str
+    turns: bool = True
+    rank: float | None = None
+    round: int = 0
+
+
+Objective = Callable[[Sequence[Tensor]], Verdict]
+"""From the pictures (C, h, w) of every view's box. `Drawer.box` tells where they are."""
+
+
+@dataclass(frozen=True)
+class AdamSettings:
+    """Of Kingma and Ba 2015; betas 0.9 and 0.999, epsilon 1e-8.
+
+    `freeze_by_zero`: while the rotation takes no part its slope is set to zero and its moments go on, so that it
+    drifts on and leaps when it is released; otherwise its step is left out and its moments start anew.
+    """
+
+    iterations: int
+    rate: float
+    weight_decay: float = 0.0
+    freeze_by_zero: bool = False
+
+
+@dataclass
+class Run:
+    """What happened. Poses are camera_T_parent."""
+
+    last: Array
+    best: Array | None = None
+    best_rank: float = np.inf
+    best_iteration: int | None = None
+    iterations: int = 0
+    in_frame: bool = True
+    steps_by_stage: dict[str, int] = field(default_factory=dict)
+    loss: float = np.nan
+    path: list[tuple[str, Array, float]] = field(default_factory=list)
+
+
+def descend(
+    drawers: Sequence[Drawer], numbers: PoseNumbers, objective: Objective, settings: AdamSettings
+) -> Run:
+    """Run all iterations, or until the robot has left every picture.
+
+    Raises:
+        SolverFailure: the loss or its derivative is not finite.
+    """
+    with _one_thread():
+        translation, rotation = (torch.tensor(part, requires_grad=True) for part in numbers.start)
+        adam = torch.optim.Adam(
+            [translation, rotation], lr=settings.rate, weight_decay=settings.weight_decay, foreach=False
+        )
+        run = Run(last=numbers.pose(*numbers.start))
+        every = max(1, settings.iterations // (_TOLD_STEPS - 2))
+        was_turning, best_round = True, 0
+        for iteration in range(settings.iterations):
+            pictures = [rendered(translation, rotation, drawer, numbers) for drawer in drawers]
+            run.last = numbers.pose(translation.detach().numpy(), rotation.detach().numpy())
+            if all(drawer.box is None for drawer in drawers):
+                run.in_frame = False
+                break
+            verdict = objective(pictures)
+            adam.zero_grad()
+            verdict.loss.backward()  # type: ignore[no-untyped-call]
+            run.loss = float(verdict.loss.detach())
+            _check(run.loss, translation.grad, rotation.grad, iteration)
+            run.steps_by_stage[verdict.stage] = run.steps_by_stage.get(verdict.stage, 0) + 1
+            if iteration % every == 0:
+                run.path.append((verdict.stage, run.last, run.loss))
+            if verdict.rank is not None and (verdict.round > best_round or verdict.rank < run.best_rank):
+                run.best, run.best_rank, run.best_iteration = run.last, verdict.rank, iteration
+                best_round = verdict.round
+            if not verdict.turns and settings.freeze_by_zero:
+                assert rotation.grad is not None
+                rotation.grad.zero_()
+            elif not verdict.turns:
+                rotation.grad = None
+            elif not was_turning and not settings.freeze_by_zero:
+                adam.state.pop(rotation, None)
+            was_turning = verdict.turns
+            adam.step()
+            run.iterations += 1
+        else:
+            run.last = numbers.pose(translation.detach().numpy(), rotation.detach().numpy())
+            for drawer in drawers:
+                drawer.draw(run.last)
+            run.in_frame = any(drawer.box is not None for drawer in drawers)
+    run.path.append(("end", run.last, run.loss))
+    return run
+
+
+def _check(loss: float, by_translation: Tensor | None, by_rotation: Tensor | None, iteration: int) -> None:
+    slopes = [slope for slope in (by_translation, by_rotation) if slope is not None]
+    if not np.isfinite(loss) or not all(bool(torch.isfinite(slope).all()) for slope in slopes):
+        raise SolverFailure(
+            f"iteration {iteration}: the loss or its derivative is not finite, the camera came too near to the robot"
+        )
+
+
+@contextmanager
+def _one_thread() -> Iterator[None]:
+    """Torch on one core: the arrays are small, and runs go side by side."""
+    before = torch.get_num_threads()
+    torch.set_num_threads(1)
+    try:
+        yield
+    finally:
+        torch.set_num_threads(before)
+
+
+def answer(
+    run: Run, views: Sequence[View], drawers: Sequence[Drawer], pose: Array, diagnostics: Mapping[str, Any]
+) -> Estimate:
+    """The estimate of a run at `pose`, camera_T_parent: its last iterate or its best.
+
+    A run that ended with the robot outside every picture has no answer, as the best of its iterates would not have
+    been known to be one. Its path stays, for the statistics.
+    """
+    told = {
+        "in_frame": run.in_frame,
+        "loss": run.loss,
+        "steps_by_stage": run.steps_by_stage,
+        "path": evidence.told_path(run.path),
+        **diagnostics,
+    }
+    renders = (run.iterations + 1) * len(drawers)
+    if not run.in_frame:
+        return Estimate(
+            status=Status.FAILED,
+            reason=f"the robot left the picture in iteration {run.iterations}: the start is too far off",
+            termination=Termination.OUT_OF_FRAME,
+            iterations=run.iterations,
+            renders=renders,
+            diagnostics=told,
+        )
+    told["overlap"] = evidence.overlap(views, pose, stages.Trace())
+    if pose is not run.last:
+        told["best_iteration"] = run.best_iteration
+        told["last_parent_T_camera"] = se3.inverse(run.last)
+    return Estimate(
+        se3.inverse(pose),
+        termination=Termination.MAX_ITERATIONS,
+        iterations=run.iterations,
+        renders=renders,
+        diagnostics=told,
+    )

@@ -1,0 +1,64 @@
+# mypy: disable-error-code="no-untyped-def"
+# ruff: noqa: ANN001, ANN201
+"""The compiled loops of the first-order methods: the picture within a rectangle, and its derivative by the pose."""
+
+from __future__ import annotations
+
+import numba
+
+_jit = numba.njit(cache=True, nogil=True, boundscheck=False)
+
+
+@_jit
+def paint(face, face_part, colours, pixels, parts, mix, area, out):
+    """Add the anti-aliased robot to `out` (C, h, w), which shows the rectangle `area` (x0, x1, y0, y1 inclusive).
+
+    `colours` (P + 1, C), the last the background's, which `out` shows already; `pixels` (N, 2), `parts` (N, 2) and
+    `mix` (N, 4) as in `Crossings`.
+    """
+    width = face.shape[1]
+    channels, background = colours.shape[1], len(colours) - 1
+    x0, y0 = area[0], area[2]
+    for y in range(out.shape[1]):
+        for x in range(out.shape[2]):
+            f = face[y0 + y, x0 + x]
+            if f >= 0:
+                part = face_part[f]
+                for c in range(channels):
+                    out[c, y, x] += colours[part, c] - colours[background, c]
+    for n in range(len(pixels)):
+        p, q = pixels[n, 0], pixels[n, 1]
+        for c in range(channels):
+            change = colours[parts[n, 1], c] - colours[parts[n, 0], c]
+            if change != 0.0:
+                out[c, p // width - y0, p % width - x0] += mix[n, 0] * change
+                out[c, q // width - y0, q % width - x0] -= mix[n, 2] * change
+
+
+@_jit
+def pull(width, colours, pixels, parts, mix, point, gradient, area, slope, total):
+    """Add to `total` (6,) what `slope` (C, h, w), the derivative of a loss by the picture of `area`, says of the pose.
+
+    The pose moves by a left perturbation [phi, rho] of camera_T_robot: a crossing at t moves by dt, and the picture
+    by dt times the difference of the two colours.
+    """
+    x0, y0 = area[0], area[2]
+    for n in range(len(pixels)):
+        p, q = pixels[n, 0], pixels[n, 1]
+        rate = 0.0
+        for c in range(colours.shape[1]):
+            change = colours[parts[n, 0], c] - colours[parts[n, 1], c]
+            if change != 0.0:
+                at_p = slope[c, p // width - y0, p % width - x0]
+                at_q = slope[c, q // width - y0, q % width - x0]
+                rate += change * (mix[n, 1] * at_p + mix[n, 3] * at_q)
+        if rate == 0.0:
+            continue
+        X, Y, Z = point[n, 0], point[n, 1], point[n, 2]
+        u, v, w = gradient[n, 0], gradient[n, 1], gradient[n, 2]
+        total[0] += rate * (Y * w - Z * v)
+        total[1] += rate * (Z * u - X * w)
+        total[2] += rate * (X * v - Y * u)
+        total[3] += rate * u
+        total[4] += rate * v
+        total[5] += rate * w
