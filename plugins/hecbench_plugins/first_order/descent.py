@@ -46,8 +46,8 @@ class Verdict:
     round: int = 0
 
 
-Objective = Callable[[Sequence[Tensor]], Verdict]
-"""From the pictures (C, h, w) of every view's box. `Drawer.box` tells where they are."""
+Objective = Callable[[Sequence[Tensor], Array], Verdict]
+"""From the pictures (C, h, w) of every view's box and camera_T_parent. `Drawer.box` tells where the boxes are."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,7 @@ def descend(
             if all(drawer.box is None for drawer in drawers):
                 run.in_frame = False
                 break
-            verdict = objective(pictures)
+            verdict = objective(pictures, run.last)
             adam.zero_grad()
             verdict.loss.backward()  # type: ignore[no-untyped-call]
             run.loss = float(verdict.loss.detach())

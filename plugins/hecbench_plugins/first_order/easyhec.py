@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from torch import Tensor
 
 from hecbench import se3
@@ -24,6 +25,8 @@ from hecbench_plugins.first_order.hemisphere import best_on_hemisphere
 from hecbench_plugins.first_order.masks import MaskMode, MaskTarget, mask_drawers
 from hecbench_plugins.first_order.poses import LogVector
 from hecbench_plugins.render_views import prepare
+
+Array = NDArray[np.float64]
 
 _RATE, _WEIGHT_DECAY = 3e-3, 5e-4
 
@@ -60,7 +63,7 @@ class EasyHeC:
         drawers = mask_drawers(recording, views, self.masks, self.backend)
         targets = [MaskTarget(view, drawer) for view, drawer in zip(views, drawers, strict=True)]
 
-        def objective(pictures: Sequence[Tensor]) -> Verdict:
+        def objective(pictures: Sequence[Tensor], camera_T_parent: Array) -> Verdict:
             losses = [
                 target.squared_error(picture[0].clamp(max=1) if self.masks == "per_link" else picture[0])
                 for target, picture in zip(targets, pictures, strict=True)
