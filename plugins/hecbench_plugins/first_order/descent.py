@@ -96,8 +96,8 @@ def descend(
         every = max(1, settings.iterations // (_TOLD_STEPS - 2))
         was_turning, best_round = True, 0
         for iteration in range(settings.iterations):
-            pictures = [rendered(translation, rotation, drawer, numbers) for drawer in drawers]
             run.last = numbers.pose(translation.detach().numpy(), rotation.detach().numpy())
+            pictures = [rendered(translation, rotation, drawer, numbers, run.last) for drawer in drawers]
             if all(drawer.box is None for drawer in drawers):
                 run.in_frame = False
                 break
@@ -132,8 +132,8 @@ def descend(
 
 
 def _check(loss: float, by_translation: Tensor | None, by_rotation: Tensor | None, iteration: int) -> None:
-    slopes = [slope for slope in (by_translation, by_rotation) if slope is not None]
-    if not np.isfinite(loss) or not all(bool(torch.isfinite(slope).all()) for slope in slopes):
+    slopes = [float(slope.sum()) for slope in (by_translation, by_rotation) if slope is not None]
+    if not np.isfinite([loss, *slopes]).all():
         raise SolverFailure(
             f"iteration {iteration}: the loss or its derivative is not finite, the camera came too near to the robot"
         )

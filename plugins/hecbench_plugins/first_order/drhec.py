@@ -23,6 +23,7 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
+from torch.nn.functional import mse_loss
 
 from hecbench import registry, se3
 from hecbench.errors import Refusal
@@ -113,7 +114,6 @@ class DRHeC:
             "variant": str(self.variant),
             "translator": self.translator,
             "centroid_px": objective.centroid_px,
-            "area_px": objective.area_px,
         }
         if self.translator == "identity" and (why := why_not_simulated(views, pose)):
             told["not_as_published"] = f"{why}, and no translator made the pictures look simulated"
@@ -121,12 +121,12 @@ class DRHeC:
 
 
 class _Objective:
-    """Losses and stages; `centroid_px` and `area_px` are the unscaled L_cen and L_area of the last pictures."""
+    """Losses and stages; `centroid_px` is the unscaled L_cen of the last pictures."""
 
     def __init__(
         self, method: DRHeC, translator: TranslatorSpec, views: Sequence[View], drawers: Sequence[Drawer]
     ) -> None:
-        self.centroid_px = self.area_px = 0.0
+        self.centroid_px: float | None = None
         self._method, self._views, self._drawers = method, views, drawers
         self._translate, self._follows = translator.factory(), translator.follows_pose
         self._geometry = [_Geometry(view, at) for view, at in zip(views, drawers, strict=True)]
@@ -146,16 +146,16 @@ class _Objective:
         rgb = _mean([colour(picture) for colour, picture in zip(self._colour, pictures, strict=True)])
         if self._method.losses is Losses.RGB:
             return Verdict(rgb, "rgb", rank=float(rgb.detach()), round=turn)
-        with torch.no_grad():
-            found = [one(picture.detach()) for one, picture in zip(self._geometry, pictures, strict=True)]
-            self.centroid_px, self.area_px = (float(_mean(list(part))) for part in zip(*found, strict=True))
+        centroid = _mean(
+            [one.centroid(picture) for one, picture in zip(self._geometry, pictures, strict=True)]
+        )
+        self.centroid_px = float(centroid.detach())
         stage, turns = self._stage(self._scale * self.centroid_px)
         if stage == "fine":
             return Verdict(rgb, stage, turns, float(rgb.detach()), turn)
-        found = [one(picture) for one, picture in zip(self._geometry, pictures, strict=True)]
-        centroid, area = (_mean(list(part)) for part in zip(*found, strict=True))
         loss = rgb + self._method.lambda_cen * self._scale * centroid
         if self._method.losses is Losses.FULL:
+            area = _mean([one.area(picture) for one, picture in zip(self._geometry, pictures, strict=True)])
             loss = loss + self._method.lambda_area * self._scale**2 * area
         return Verdict(loss, stage, turns, float(loss.detach()) if stage == "one stage" else None, turn)
 
@@ -184,8 +184,8 @@ class _Colour:
         box = self._at.box
         if box is None:
             return (picture.sum() + self._squares.total) / self._count
-        off = picture[:3] - self._reference[(slice(None), *box.slices)]
-        return ((off * off).sum() + self._squares.outside(box)) / self._count
+        inside = mse_loss(picture[:3], self._reference[(slice(None), *box.slices)], reduction="sum")
+        return (inside + self._squares.outside(box)) / self._count
 
 
 class _Geometry:
@@ -196,23 +196,23 @@ class _Geometry:
         self._columns = torch.arange(at.width, dtype=torch.float32) - (at.width - 1) / 2
         self._rows = torch.arange(at.height, dtype=torch.float32) - (at.height - 1) / 2
         mask = torch.from_numpy(np.ascontiguousarray(view.levels[1].observed[..., 3]))
-        self._centroid, self._area = self._measured(mask, self._columns, self._rows)
+        self._reference = self._mean_place(torch.expm1(mask), self._columns, self._rows)
+        self._reference_area = (torch.sigmoid(mask) - 0.5).sum()
 
-    def __call__(self, picture: Tensor) -> tuple[Tensor, Tensor]:
-        box = self._at.box
-        if box is None:
-            rows, columns = slice(0, 0), slice(0, 0)
-        else:
-            rows, columns = box.slices
-        centroid, area = self._measured(picture[3], self._columns[columns], self._rows[rows])
-        return torch.linalg.vector_norm(centroid - self._centroid), (area - self._area).abs()
+    def centroid(self, picture: Tensor) -> Tensor:
+        """L_cen, px."""
+        rows, columns = self._at.box.slices if self._at.box else (slice(0, 0), slice(0, 0))
+        place = self._mean_place(torch.expm1(picture[3]), self._columns[columns], self._rows[rows])
+        return torch.linalg.vector_norm(place - self._reference)
 
-    def _measured(self, mask: Tensor, columns: Tensor, rows: Tensor) -> tuple[Tensor, Tensor]:
-        """Centroid (2,) px from the picture's middle, and area over that of an empty picture."""
-        weight = torch.expm1(mask)
+    def area(self, picture: Tensor) -> Tensor:
+        """L_area, px."""
+        return ((torch.sigmoid(picture[3]) - 0.5).sum() - self._reference_area).abs()
+
+    def _mean_place(self, weight: Tensor, columns: Tensor, rows: Tensor) -> Tensor:
+        """(2,) px from the picture's middle, of the weight of pixels in the softmax over that of an empty one."""
         total = weight.sum() + self._at.width * self._at.height
-        centroid = torch.stack([weight.sum(0) @ columns, weight.sum(1) @ rows]) / total
-        return centroid, (torch.sigmoid(mask) - 0.5).sum()
+        return torch.stack([weight.sum(0) @ columns, weight.sum(1) @ rows]) / total
 
 
 def _mean(values: Sequence[Tensor]) -> Tensor:

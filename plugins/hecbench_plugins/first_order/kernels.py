@@ -4,6 +4,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numba
 
 _jit = numba.njit(cache=True, nogil=True, boundscheck=False)
@@ -62,3 +64,25 @@ def pull(width, colours, pixels, parts, mix, point, gradient, area, slope, total
         total[3] += rate * u
         total[4] += rate * v
         total[5] += rate * w
+
+
+@_jit
+def exponential(rotvec, rotation, jacobian):
+    """Fill `rotation` (3, 3) with R = Exp(w) and `jacobian` (3, 3) with V(w) (Barfoot 2017, eqs. 7.14 and 7.37)."""
+    x, y, z = rotvec[0], rotvec[1], rotvec[2]
+    square = x * x + y * y + z * z
+    angle = math.sqrt(square)
+    if angle < 1e-4:
+        first, second, third = 1 - square / 6, 0.5 - square / 24, 1 / 6 - square / 120
+    else:
+        first = math.sin(angle) / angle
+        second = (1 - math.cos(angle)) / square
+        third = (1 - first) / square
+    hat = ((0.0, -z, y), (z, 0.0, -x), (-y, x, 0.0))
+    w = (x, y, z)
+    for i in range(3):
+        for j in range(3):
+            one = 1.0 if i == j else 0.0
+            twice = w[i] * w[j] - one * square
+            rotation[i, j] = one + first * hat[i][j] + second * twice
+            jacobian[i, j] = one + second * hat[i][j] + third * twice

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 import torch
 from torch import Tensor
+from torch.nn.functional import mse_loss
 
 from hecbench.recording import Recording
 from hecbench_plugins.first_order.backend import Backend, drawer
@@ -41,5 +42,5 @@ class MaskTarget:
         box = self._drawer.box
         if box is None:
             return drawn.sum() + self._squares.total
-        off = drawn - self._tensor[box.slices]
-        return (off * off).sum() + self._squares.outside(box)
+        inside = mse_loss(drawn, self._tensor[box.slices], reduction="sum")
+        return inside + self._squares.outside(box)

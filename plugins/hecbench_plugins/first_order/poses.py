@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
+from hecbench_plugins.first_order import kernels
 
 Array = NDArray[np.float64]
 
@@ -45,13 +46,13 @@ class Increment:
 
     def pose(self, translation: Array, rotation: Array) -> Array:
         """See `PoseNumbers`."""
-        turned = _rotation(rotation) @ self._camera_T_parent[:3, :3]
-        return se3.make(turned, self._camera_T_parent[:3, 3] + translation)
+        turned = _exponential(rotation)[0] @ self._camera_T_parent[:3, :3]
+        return _transform(turned, self._camera_T_parent[:3, 3] + translation)
 
     def pull(self, translation: Array, rotation: Array, slope: Array) -> tuple[Array, Array]:
         """See `PoseNumbers`."""
         turn = _about_origin(slope, self._camera_T_parent[:3, 3] + translation)
-        return slope[3:], se3.left_jacobian(rotation).T @ turn
+        return slope[3:], _exponential(rotation)[1].T @ turn
 
 
 class LogVector:
@@ -63,7 +64,8 @@ class LogVector:
 
     def pose(self, translation: Array, rotation: Array) -> Array:
         """See `PoseNumbers`."""
-        return se3.make(_rotation(rotation), se3.left_jacobian(rotation) @ translation)
+        R, V = _exponential(rotation)
+        return _transform(R, V @ translation)
 
     def pull(self, translation: Array, rotation: Array, slope: Array) -> tuple[Array, Array]:
         """See `PoseNumbers`."""
@@ -85,24 +87,37 @@ class EulerAngles:
 
     def pose(self, translation: Array, rotation: Array) -> Array:
         """See `PoseNumbers`."""
-        a, b, c = _rotation(np.diag(rotation))
-        return se3.make(a @ b @ c, translation)
+        a, b, c = self._turns(rotation)
+        return _transform(a @ b @ c, translation)
 
     def pull(self, translation: Array, rotation: Array, slope: Array) -> tuple[Array, Array]:
         """See `PoseNumbers`."""
-        a, b, _ = _rotation(np.diag(rotation))
-        axes = np.stack([[1.0, 0, 0], a[:, 1], (a @ b)[:, 2]])
+        a, b, _ = self._turns(rotation)
+        axes = np.array([[1.0, 0, 0], a[:, 1], (a @ b)[:, 2]])
         return slope[3:], axes @ _about_origin(slope, translation)
+
+    def _turns(self, rotation: Array) -> list[Array]:
+        return [_exponential(about)[0] for about in np.diag(rotation)]
+
+
+def _transform(rotation: Array, translation: Array) -> Array:
+    """One transform (4, 4), as `se3.make` does, without its care for leading axes."""
+    a_T_b = np.eye(4)
+    a_T_b[:3, :3], a_T_b[:3, 3] = rotation, translation
+    return a_T_b
 
 
 def _about_origin(slope: Array, origin: Array) -> Array:
-    """The slope (3,) by a turn about the parent's origin, which stays in its place."""
-    return np.asarray(slope[:3] - np.cross(origin, slope[3:]))
+    """The slope (3,) by a turn about the parent's origin, which stays in its place: phi's minus origin x rho's."""
+    (x, y, z), (u, v, w) = origin, slope[3:]
+    return slope[:3] - np.array([y * w - z * v, z * u - x * w, x * v - y * u])
 
 
-def _rotation(rotvec: Array) -> Array:
-    """Exp(w) = 1 + [w]x V(w)."""
-    return np.asarray(np.eye(3) + se3.hat(rotvec) @ se3.left_jacobian(rotvec))
+def _exponential(rotvec: Array) -> tuple[Array, Array]:
+    """Exp(w) and V(w), both (3, 3)."""
+    rotation, jacobian = np.empty((3, 3)), np.empty((3, 3))
+    kernels.exponential(rotvec, rotation, jacobian)
+    return rotation, jacobian
 
 
 def _left_jacobian(twist: Array) -> Array:
