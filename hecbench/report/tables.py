@@ -119,6 +119,7 @@ def _level_table(group: Group) -> Table:
             "TRE: rms displacement of workspace points. Medians and rates count every run, one without an "
             "answer as infinitely wrong; the mean is over the answers. Ranks are shared where intervals overlap.",
             *_reasons(group.estimates),
+            *_departures(group.estimates),
         ),
     )
 
@@ -153,6 +154,7 @@ def _recording_table(title: str, estimates: Sequence[Estimate]) -> Table:
         "Held-out: rms prediction of samples left out in 5 folds, the target pose refitted by the ruler. "
         "Spread: rms deviation of the constant target pose over all samples, raw robot poses.",
         *_reasons(estimates),
+        *_departures(estimates),
     )
     return Table(title, ("solver", "status", "rank", *shown), rows, notes, left=2)
 
@@ -177,6 +179,18 @@ def _reasons(estimates: Iterable[Estimate]) -> list[str]:
     return [
         f"{solver} {status}{f' {len(found)} times, first' if len(found) > 1 else ''}: {found[0]}"
         for (solver, status), found in sorted(reasons.items())
+    ]
+
+
+def _departures(estimates: Iterable[Estimate]) -> list[str]:
+    """For each solver that was not run as its authors published it: how often, and the first reason."""
+    reasons: dict[str, list[str]] = {}
+    for estimate in estimates:
+        if told := estimate.diagnostics.get("not_as_published"):
+            reasons.setdefault(estimate.solver, []).append(str(told))
+    return [
+        f"{solver} is not the published method here{f' in {len(found)} runs, first' if len(found) > 1 else ''}: {found[0]}"
+        for solver, found in sorted(reasons.items())
     ]
 
 

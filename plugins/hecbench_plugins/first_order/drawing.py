@@ -88,7 +88,9 @@ class CpuDrawer:
             self.box = None
             return np.zeros((channels, 0, 0), np.float32)
         (x0, _, y0, _), (_, x1, _, y1) = boxes.min(0).tolist(), boxes.max(0).tolist()
-        self.box = Box(max(x0 - 1, 0), min(x1 + 1, self.width - 1), max(y0 - 1, 0), min(y1 + 1, self.height - 1))
+        self.box = Box(
+            max(x0 - 1, 0), min(x1 + 1, self.width - 1), max(y0 - 1, 0), min(y1 + 1, self.height - 1)
+        )
         shape = (channels, self.box.y1 - self.box.y0 + 1, self.box.x1 - self.box.x0 + 1)
         picture = self._buffer[: int(np.prod(shape))].reshape(shape)
         picture[:] = self._colours[-1][:, None, None]

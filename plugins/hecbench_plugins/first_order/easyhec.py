@@ -57,7 +57,9 @@ class EasyHeC:
             start = found.camera_T_parent
             told |= {"start_overlap": found.overlap, "start_candidates": found.candidates}
         elif recording.initial_parent_T_camera is None:
-            raise Refusal("easyhec needs a start: initial_parent_T_camera, or --init FILE; easyhecpp needs none")
+            raise Refusal(
+                "easyhec needs a start: initial_parent_T_camera, or --init FILE; easyhecpp needs none"
+            )
         else:
             start = se3.inverse(recording.initial_parent_T_camera)
         drawers = mask_drawers(recording, views, self.masks, self.backend)

@@ -120,7 +120,9 @@ class _Losses:
             drawer.pull(slope.contiguous().numpy())
             for drawer, slope in zip(self._drawers, slopes, strict=True)
         )
-        return float(np.linalg.norm(np.concatenate(self._numbers.pull(*self._numbers.start, np.asarray(left)))))
+        return float(
+            np.linalg.norm(np.concatenate(self._numbers.pull(*self._numbers.start, np.asarray(left))))
+        )
 
 
 def _distance(target: MaskTarget, gamma: float | None) -> Tensor:
@@ -129,4 +131,6 @@ def _distance(target: MaskTarget, gamma: float | None) -> Tensor:
 
     outside = (target.mask <= 0.5).astype(np.uint8)
     unit = gamma if gamma is not None else float(np.hypot(*outside.shape)) / 2
-    return torch.from_numpy(cv2.distanceTransform(outside, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) / np.float32(unit))
+    return torch.from_numpy(
+        cv2.distanceTransform(outside, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) / np.float32(unit)
+    )

@@ -12,7 +12,14 @@ from torch.nn.functional import mse_loss
 
 from hecbench.recording import Recording
 from hecbench_plugins.first_order.backend import Backend, drawer
-from hecbench_plugins.first_order.drawing import MASK, BoxSum, Drawer, link_mask_meshes, robot_name, whole_mask_mesh
+from hecbench_plugins.first_order.drawing import (
+    MASK,
+    BoxSum,
+    Drawer,
+    link_mask_meshes,
+    robot_name,
+    whole_mask_mesh,
+)
 from hecbench_plugins.render_views import Picture, View
 
 MaskMode = Literal["zbuffered", "per_link"]

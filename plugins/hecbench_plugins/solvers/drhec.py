@@ -30,7 +30,11 @@ def hecbench_solvers() -> Iterable[SolverSpec]:
     """The three sets of losses."""
     weights = (
         Option("lambda_cen", not_negative, "weight of the centroid's loss, 0.01 by default"),
-        Option("threshold", not_negative, "px of the centroid's loss at which the fine stage begins, 0.25 by default"),
+        Option(
+            "threshold",
+            not_negative,
+            "px of the centroid's loss at which the fine stage begins, 0.25 by default",
+        ),
     )
     for name, (losses, compared) in _METHODS.items():
         chosen: tuple[Option, ...] = () if losses == "rgb" else weights
@@ -45,7 +49,9 @@ def hecbench_solvers() -> Iterable[SolverSpec]:
             imports=("torch",),
             slow=True,
             options=(
-                Option("variant", choice("literal", "resolved"), "resolved, or literal: Algorithm 1 as printed"),
+                Option(
+                    "variant", choice("literal", "resolved"), "resolved, or literal: Algorithm 1 as printed"
+                ),
                 *chosen,
                 Option("translator", str, "plugin that makes pictures look simulated, identity by default"),
                 ITERATIONS,

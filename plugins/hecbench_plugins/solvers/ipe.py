@@ -28,7 +28,9 @@ def hecbench_solvers() -> Iterable[SolverSpec]:
         imports=("torch",),
         slow=True,
         options=(
-            Option("gamma", positive, "px that distances are divided by, half the picture's diagonal by default"),
+            Option(
+                "gamma", positive, "px that distances are divided by, half the picture's diagonal by default"
+            ),
             ITERATIONS,
             BACKEND,
         ),
