@@ -188,10 +188,11 @@ def _departures(estimates: Iterable[Estimate]) -> list[str]:
     for estimate in estimates:
         if told := estimate.diagnostics.get("not_as_published"):
             reasons.setdefault(estimate.solver, []).append(str(told))
-    return [
-        f"{solver} is not the published method here{f' in {len(found)} runs, first' if len(found) > 1 else ''}: {found[0]}"
-        for solver, found in sorted(reasons.items())
-    ]
+    lines = []
+    for solver, found in sorted(reasons.items()):
+        often = f" in {len(found)} runs, first" if len(found) > 1 else ""
+        lines.append(f"{solver} is not the published method here{often}: {found[0]}")
+    return lines
 
 
 _ABSENT = "-"

@@ -169,7 +169,11 @@ def answer(
     if not run.in_frame:
         return Estimate(
             status=Status.FAILED,
-            reason=f"the robot left the picture in iteration {run.iterations}: the start is too far off",
+            reason=(
+                f"the robot left the picture in iteration {run.iterations}: the start is too far off"
+                if run.iterations
+                else "the robot is not in the picture at the start: check the start's units and direction"
+            ),
             termination=Termination.OUT_OF_FRAME,
             iterations=run.iterations,
             renders=renders,

@@ -207,7 +207,8 @@ class _Geometry:
 
     def area(self, picture: Tensor) -> Tensor:
         """L_area, px."""
-        return ((torch.sigmoid(picture[3]) - 0.5).sum() - self._reference_area).abs()
+        off: Tensor = (torch.sigmoid(picture[3]) - 0.5).sum() - self._reference_area
+        return off.abs()
 
     def _mean_place(self, weight: Tensor, columns: Tensor, rows: Tensor) -> Tensor:
         """(2,) px from the picture's middle, of the weight of pixels in the softmax over that of an empty one."""

@@ -120,9 +120,9 @@ class _Losses:
             drawer.pull(slope.contiguous().numpy())
             for drawer, slope in zip(self._drawers, slopes, strict=True)
         )
-        return float(
-            np.linalg.norm(np.concatenate(self._numbers.pull(*self._numbers.start, np.asarray(left))))
-        )
+        translation, rotation = self._numbers.start
+        by_numbers = self._numbers.pull(translation, rotation, np.asarray(left))
+        return float(np.linalg.norm(np.concatenate(by_numbers)))
 
 
 def _distance(target: MaskTarget, gamma: float | None) -> Tensor:

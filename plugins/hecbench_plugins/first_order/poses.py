@@ -110,7 +110,7 @@ def _transform(rotation: Array, translation: Array) -> Array:
 def _about_origin(slope: Array, origin: Array) -> Array:
     """The slope (3,) by a turn about the parent's origin, which stays in its place: phi's minus origin x rho's."""
     (x, y, z), (u, v, w) = origin, slope[3:]
-    return slope[:3] - np.array([y * w - z * v, z * u - x * w, x * v - y * u])
+    return np.asarray(slope[:3] - np.array([y * w - z * v, z * u - x * w, x * v - y * u]))
 
 
 def _exponential(rotvec: Array) -> tuple[Array, Array]:

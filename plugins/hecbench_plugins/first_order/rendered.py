@@ -40,5 +40,5 @@ def rendered(
     Its derivative is the crossings' (see `hecbench.rendering`), contracted with the slope of the loss when torch
     asks for it. Picture and derivative belong to the drawer and are valid until it draws again.
     """
-    picture: Tensor = _Render.apply(translation, rotation, drawer, numbers, pose)
+    picture: Tensor = _Render.apply(translation, rotation, drawer, numbers, pose)  # type: ignore[no-untyped-call]
     return picture
