@@ -70,13 +70,24 @@ class Run:
 
     last: Array
     best: Array | None = None
-    best_rank: float = np.inf
     best_iteration: int | None = None
     iterations: int = 0
     in_frame: bool = True
     steps_by_stage: dict[str, int] = field(default_factory=dict)
     loss: float = np.nan
     path: list[tuple[str, Array, float]] = field(default_factory=list)
+    _best_rank: tuple[int, float] = (0, np.inf)
+
+    def note(self, verdict: Verdict, told: bool) -> None:
+        """Count an iteration, keep its pose if it is the best so far, and in the path if it is `told`."""
+        self.loss = float(verdict.loss.detach())
+        self.steps_by_stage[verdict.stage] = self.steps_by_stage.get(verdict.stage, 0) + 1
+        if told:
+            self.path.append((verdict.stage, self.last, self.loss))
+        if verdict.rank is not None and (-verdict.round, verdict.rank) < self._best_rank:
+            self.best, self.best_iteration = self.last, self.iterations
+            self._best_rank = -verdict.round, verdict.rank
+        self.iterations += 1
 
 
 def descend(
@@ -92,50 +103,45 @@ def descend(
         adam = torch.optim.Adam(
             [translation, rotation], lr=settings.rate, weight_decay=settings.weight_decay, foreach=False
         )
-        run = Run(last=numbers.pose(*numbers.start))
+
+        def pose() -> Array:
+            return numbers.pose(translation.detach().numpy(), rotation.detach().numpy())
+
+        run = Run(last=pose())
         every = max(1, settings.iterations // (_TOLD_STEPS - 2))
-        was_turning, best_round = True, 0
+        turned = True
         for iteration in range(settings.iterations):
-            run.last = numbers.pose(translation.detach().numpy(), rotation.detach().numpy())
             pictures = [rendered(translation, rotation, drawer, numbers, run.last) for drawer in drawers]
             if all(drawer.box is None for drawer in drawers):
-                run.in_frame = False
                 break
             verdict = objective(pictures, run.last)
             adam.zero_grad()
             verdict.loss.backward()  # type: ignore[no-untyped-call]
-            run.loss = float(verdict.loss.detach())
-            _check(run.loss, translation.grad, rotation.grad, iteration)
-            run.steps_by_stage[verdict.stage] = run.steps_by_stage.get(verdict.stage, 0) + 1
-            if iteration % every == 0:
-                run.path.append((verdict.stage, run.last, run.loss))
-            if verdict.rank is not None and (verdict.round > best_round or verdict.rank < run.best_rank):
-                run.best, run.best_rank, run.best_iteration = run.last, verdict.rank, iteration
-                best_round = verdict.round
-            if not verdict.turns and settings.freeze_by_zero:
-                assert rotation.grad is not None
-                rotation.grad.zero_()
+            run.note(verdict, told=iteration % every == 0)
+            _check(run, translation.grad, rotation.grad)
+            if settings.freeze_by_zero and not verdict.turns:
+                rotation.grad = torch.zeros_like(rotation)
             elif not verdict.turns:
                 rotation.grad = None
-            elif not was_turning and not settings.freeze_by_zero:
+            elif not turned and not settings.freeze_by_zero:
                 adam.state.pop(rotation, None)
-            was_turning = verdict.turns
+            turned = verdict.turns
             adam.step()
-            run.iterations += 1
-        else:
-            run.last = numbers.pose(translation.detach().numpy(), rotation.detach().numpy())
-            for drawer in drawers:
-                drawer.draw(run.last)
-            run.in_frame = any(drawer.box is not None for drawer in drawers)
+            run.last = pose()
+        for drawer in drawers:
+            drawer.draw(run.last)
+        run.in_frame = any(drawer.box is not None for drawer in drawers)
     run.path.append(("end", run.last, run.loss))
     return run
 
 
-def _check(loss: float, by_translation: Tensor | None, by_rotation: Tensor | None, iteration: int) -> None:
-    slopes = [float(slope.sum()) for slope in (by_translation, by_rotation) if slope is not None]
-    if not np.isfinite([loss, *slopes]).all():
+def _check(run: Run, *slopes: Tensor | None) -> None:
+    """Raises SolverFailure when the loss or one of its slopes is not finite."""
+    numbers = [run.loss, *(float(slope.sum()) for slope in slopes if slope is not None)]
+    if not np.isfinite(numbers).all():
         raise SolverFailure(
-            f"iteration {iteration}: the loss or its derivative is not finite, the camera came too near to the robot"
+            f"iteration {run.iterations}: the loss or its derivative is not finite: the camera came too near to the"
+            " robot"
         )
 
 
@@ -153,10 +159,10 @@ def _one_thread() -> Iterator[None]:
 def answer(
     run: Run, views: Sequence[View], drawers: Sequence[Drawer], pose: Array, diagnostics: Mapping[str, Any]
 ) -> Estimate:
-    """The estimate of a run at `pose`, camera_T_parent: its last iterate or its best.
+    """The estimate of a run: its answer is `pose`, camera_T_parent, the last iterate or the best.
 
-    A run that ended with the robot outside every picture has no answer, as the best of its iterates would not have
-    been known to be one. Its path stays, for the statistics.
+    A run that ended with the robot outside every picture has no answer, whatever it passed on its way. Its path is
+    told all the same.
     """
     told = {
         "in_frame": run.in_frame,
@@ -180,7 +186,7 @@ def answer(
             diagnostics=told,
         )
     told["overlap"] = evidence.overlap(views, pose, stages.Trace())
-    if pose is not run.last:
+    if pose is run.best:
         told["best_iteration"] = run.best_iteration
         told["last_parent_T_camera"] = se3.inverse(run.last)
     return Estimate(

@@ -203,7 +203,8 @@ class _Geometry:
         """L_cen, px."""
         rows, columns = self._at.box.slices if self._at.box else (slice(0, 0), slice(0, 0))
         place = self._mean_place(torch.expm1(picture[3]), self._columns[columns], self._rows[rows])
-        return torch.linalg.vector_norm(place - self._reference)
+        distance: Tensor = torch.linalg.vector_norm(place - self._reference)
+        return distance
 
     def area(self, picture: Tensor) -> Tensor:
         """L_area, px."""
