@@ -17,6 +17,7 @@ from hecbench.errors import SolverFailure
 from hecbench.estimate import Estimate, Status, Termination
 from hecbench_plugins import render_evidence as evidence
 from hecbench_plugins import render_stages as stages
+from hecbench_plugins.first_order.adam import Adam
 from hecbench_plugins.first_order.drawing import Drawer
 from hecbench_plugins.first_order.poses import PoseNumbers
 from hecbench_plugins.first_order.rendered import rendered
@@ -52,7 +53,7 @@ Objective = Callable[[Sequence[Tensor], Array], Verdict]
 
 @dataclass(frozen=True)
 class AdamSettings:
-    """Of Kingma and Ba 2015; betas 0.9 and 0.999, epsilon 1e-8.
+    """What differs between the methods.
 
     `freeze_by_zero`: while the rotation takes no part its slope is set to zero and its moments go on, so that it
     drifts on and leaps when it is released; otherwise its step is left out and its moments start anew.
@@ -98,47 +99,44 @@ def descend(
     Raises:
         SolverFailure: the loss or its derivative is not finite.
     """
+    translation, rotation = (
+        Adam(part.copy(), settings.rate, settings.weight_decay) for part in numbers.start
+    )
+    leaves = (
+        torch.from_numpy(translation.values).requires_grad_(),
+        torch.from_numpy(rotation.values).requires_grad_(),
+    )
+    run = Run(last=numbers.pose(translation.values, rotation.values))
+    every = max(1, settings.iterations // (_TOLD_STEPS - 2))
+    turned = True
     with _one_thread():
-        translation, rotation = (torch.tensor(part, requires_grad=True) for part in numbers.start)
-        adam = torch.optim.Adam(
-            [translation, rotation], lr=settings.rate, weight_decay=settings.weight_decay, foreach=False
-        )
-
-        def pose() -> Array:
-            return numbers.pose(translation.detach().numpy(), rotation.detach().numpy())
-
-        run = Run(last=pose())
-        every = max(1, settings.iterations // (_TOLD_STEPS - 2))
-        turned = True
         for iteration in range(settings.iterations):
-            pictures = [rendered(translation, rotation, drawer, numbers, run.last) for drawer in drawers]
+            pictures = [rendered(*leaves, drawer, numbers, run.last) for drawer in drawers]
             if all(drawer.box is None for drawer in drawers):
                 break
             verdict = objective(pictures, run.last)
-            adam.zero_grad()
-            verdict.loss.backward()  # type: ignore[no-untyped-call]
+            shift, turn = (slope.numpy() for slope in torch.autograd.grad(verdict.loss, leaves))
             run.note(verdict, told=iteration % every == 0)
-            _check(run, translation.grad, rotation.grad)
-            if settings.freeze_by_zero and not verdict.turns:
-                rotation.grad = torch.zeros_like(rotation)
-            elif not verdict.turns:
-                rotation.grad = None
-            elif not turned and not settings.freeze_by_zero:
-                adam.state.pop(rotation, None)
+            _check(run, shift, turn)
+            translation.step(shift)
+            if verdict.turns:
+                if not turned and not settings.freeze_by_zero:
+                    rotation.restart()
+                rotation.step(turn)
+            elif settings.freeze_by_zero:
+                rotation.step(np.zeros(3))
             turned = verdict.turns
-            adam.step()
-            run.last = pose()
-        for drawer in drawers:
-            drawer.draw(run.last)
-        run.in_frame = any(drawer.box is not None for drawer in drawers)
+            run.last = numbers.pose(translation.values, rotation.values)
+    for drawer in drawers:
+        drawer.draw(run.last)
+    run.in_frame = any(drawer.box is not None for drawer in drawers)
     run.path.append(("end", run.last, run.loss))
     return run
 
 
-def _check(run: Run, *slopes: Tensor | None) -> None:
+def _check(run: Run, *slopes: Array) -> None:
     """Raises SolverFailure when the loss or one of its slopes is not finite."""
-    numbers = [run.loss, *(float(slope.sum()) for slope in slopes if slope is not None)]
-    if not np.isfinite(numbers).all():
+    if not np.isfinite([run.loss, *(slope.sum() for slope in slopes)]).all():
         raise SolverFailure(
             f"iteration {run.iterations}: the loss or its derivative is not finite: the camera came too near to the"
             " robot"

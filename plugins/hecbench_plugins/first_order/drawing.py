@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -82,20 +83,22 @@ class CpuDrawer:
         poses = camera_T_parent @ self._parent_T_link
         for renderer in self._renderers:
             renderer.draw(poses)
-        boxes = np.array([renderer.box for renderer in self._renderers if renderer.box[1] >= renderer.box[0]])
+        boxes = [renderer.box.tolist() for renderer in self._renderers]
+        boxes = [box for box in boxes if box[1] >= box[0]]
         channels = self._colours.shape[1]
-        if not len(boxes):
+        if not boxes:
             self.box = None
             return np.zeros((channels, 0, 0), np.float32)
-        (x0, _, y0, _), (_, x1, _, y1) = boxes.min(0).tolist(), boxes.max(0).tolist()
-        self.box = Box(
-            max(x0 - 1, 0), min(x1 + 1, self.width - 1), max(y0 - 1, 0), min(y1 + 1, self.height - 1)
+        self.box = box = Box(
+            max(min(box[0] for box in boxes) - 1, 0),
+            min(max(box[1] for box in boxes) + 1, self.width - 1),
+            max(min(box[2] for box in boxes) - 1, 0),
+            min(max(box[3] for box in boxes) + 1, self.height - 1),
         )
-        shape = (channels, self.box.y1 - self.box.y0 + 1, self.box.x1 - self.box.x0 + 1)
-        picture = self._buffer[: int(np.prod(shape))].reshape(shape)
-        picture[:] = self._colours[-1][:, None, None]
-        self._area = np.array([self.box.x0, self.box.x1, self.box.y0, self.box.y1])
-        for renderer in self._renderers:
+        shape = (channels, box.y1 - box.y0 + 1, box.x1 - box.x0 + 1)
+        picture = self._buffer[: math.prod(shape)].reshape(shape)
+        self._area = np.array([box.x0, box.x1, box.y0, box.y1])
+        for number, renderer in enumerate(self._renderers):
             found = renderer.crossings
             kernels.paint(
                 renderer.face,
@@ -105,6 +108,7 @@ class CpuDrawer:
                 found.parts,
                 found.mix,
                 self._area,
+                number == 0,
                 picture,
             )
         return picture

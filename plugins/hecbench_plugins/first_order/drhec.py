@@ -23,7 +23,6 @@ import numpy as np
 import torch
 from numpy.typing import NDArray
 from torch import Tensor
-from torch.nn.functional import mse_loss
 
 from hecbench import registry, se3
 from hecbench.errors import Refusal
@@ -32,10 +31,12 @@ from hecbench.recording import Recording
 from hecbench.specs import Kind, Translator, TranslatorSpec
 from hecbench_plugins.first_order.backend import Backend, drawer
 from hecbench_plugins.first_order.descent import AdamSettings, Run, Verdict, answer, descend
-from hecbench_plugins.first_order.drawing import BoxSum, Drawer
+from hecbench_plugins.first_order.drawing import Drawer
+from hecbench_plugins.first_order.losses import SquaredError, geometry, geometry_of
+from hecbench_plugins.first_order.masks import mask_of
 from hecbench_plugins.first_order.poses import EulerAngles, Increment, PoseNumbers
 from hecbench_plugins.first_order.simlike import cut_out, why_not_simulated
-from hecbench_plugins.render_views import View, prepare
+from hecbench_plugins.render_views import Picture, View, prepare
 
 Array = NDArray[np.float64]
 
@@ -44,6 +45,8 @@ _REFERENCE_WIDTH_PX = 640
 _LEAVE_FINE = 2.0
 """Times the threshold: beyond it a resolved run goes back to the coarse stage."""
 _TRANSLATE_EVERY = 100
+_COVERAGE = 3
+"""The channel of a drawn picture that holds the robot's mask."""
 
 
 class Losses(StrEnum):
@@ -129,33 +132,38 @@ class _Objective:
         self.centroid_px: float | None = None
         self._method, self._views, self._drawers = method, views, drawers
         self._translate, self._follows = translator.factory(), translator.follows_pose
-        self._geometry = [_Geometry(view, at) for view, at in zip(views, drawers, strict=True)]
-        self._colour: list[_Colour] = []
+        self._aims = [geometry_of(mask_of(view)) for view in views]
+        self._colour: list[SquaredError] = []
         self._calls, self._fine = 0, False
         width = drawers[0].width
+        self._per_value = 1 / (3 * width * drawers[0].height)
         self._scale = _REFERENCE_WIDTH_PX / width if method.variant is Variant.RESOLVED else 1.0
 
     def __call__(self, pictures: Sequence[Tensor], camera_T_parent: Array) -> Verdict:
         if self._calls == 0 or (self._follows and self._calls % _TRANSLATE_EVERY == 0):
             self._colour = [
-                _Colour(_translated(self._translate, view, camera_T_parent), at)
+                SquaredError(_translated(self._translate, view, camera_T_parent), at)
                 for view, at in zip(self._views, self._drawers, strict=True)
             ]
         turn = self._calls // _TRANSLATE_EVERY if self._follows else 0
         self._calls += 1
-        rgb = _mean([colour(picture) for colour, picture in zip(self._colour, pictures, strict=True)])
+        rgb = self._per_value * _mean(
+            [colour(picture) for colour, picture in zip(self._colour, pictures, strict=True)]
+        )
         if self._method.losses is Losses.RGB:
             return Verdict(rgb, "rgb", rank=float(rgb.detach()), round=turn)
-        centroid = _mean(
-            [one.centroid(picture) for one, picture in zip(self._geometry, pictures, strict=True)]
-        )
+        off = [
+            geometry(picture, _COVERAGE, at) - aim
+            for picture, at, aim in zip(pictures, self._drawers, self._aims, strict=True)
+        ]
+        centroid = _mean([torch.linalg.vector_norm(one[:2]) for one in off])
         self.centroid_px = float(centroid.detach())
         stage, turns = self._stage(self._scale * self.centroid_px)
         if stage == "fine":
             return Verdict(rgb, stage, turns, float(rgb.detach()), turn)
         loss = rgb + self._method.lambda_cen * self._scale * centroid
         if self._method.losses is Losses.FULL:
-            area = _mean([one.area(picture) for one, picture in zip(self._geometry, pictures, strict=True)])
+            area = _mean([one[2].abs() for one in off])
             loss = loss + self._method.lambda_area * self._scale**2 * area
         return Verdict(loss, stage, turns, float(loss.detach()) if stage == "one stage" else None, turn)
 
@@ -171,58 +179,14 @@ class _Objective:
         return ("fine", True) if self._fine else ("coarse", False)
 
 
-class _Colour:
-    """L_rgb of one view against a translated picture (H, W, 3); the drawn robot stands before black."""
-
-    def __init__(self, translated: NDArray[np.float32], at: Drawer) -> None:
-        self._at = at
-        self._reference = torch.from_numpy(np.ascontiguousarray(np.moveaxis(translated, -1, 0)))
-        self._squares = BoxSum((translated.astype(float) ** 2).sum(-1))
-        self._count = translated.size
-
-    def __call__(self, picture: Tensor) -> Tensor:
-        box = self._at.box
-        if box is None:
-            return (picture.sum() + self._squares.total) / self._count
-        inside = mse_loss(picture[:3], self._reference[(slice(None), *box.slices)], reduction="sum")
-        return (inside + self._squares.outside(box)) / self._count
-
-
-class _Geometry:
-    """L_cen and L_area of one view. Outside the box G is 0: weight 1 in the softmax, 1/2 in the area."""
-
-    def __init__(self, view: View, at: Drawer) -> None:
-        self._at = at
-        self._columns = torch.arange(at.width, dtype=torch.float32) - (at.width - 1) / 2
-        self._rows = torch.arange(at.height, dtype=torch.float32) - (at.height - 1) / 2
-        mask = torch.from_numpy(np.ascontiguousarray(view.levels[1].observed[..., 3]))
-        self._reference = self._mean_place(torch.expm1(mask), self._columns, self._rows)
-        self._reference_area = (torch.sigmoid(mask) - 0.5).sum()
-
-    def centroid(self, picture: Tensor) -> Tensor:
-        """L_cen, px."""
-        rows, columns = self._at.box.slices if self._at.box else (slice(0, 0), slice(0, 0))
-        place = self._mean_place(torch.expm1(picture[3]), self._columns[columns], self._rows[rows])
-        distance: Tensor = torch.linalg.vector_norm(place - self._reference)
-        return distance
-
-    def area(self, picture: Tensor) -> Tensor:
-        """L_area, px."""
-        off: Tensor = (torch.sigmoid(picture[3]) - 0.5).sum() - self._reference_area
-        return off.abs()
-
-    def _mean_place(self, weight: Tensor, columns: Tensor, rows: Tensor) -> Tensor:
-        """(2,) px from the picture's middle, of the weight of pixels in the softmax over that of an empty one."""
-        total = weight.sum() + self._at.width * self._at.height
-        return torch.stack([weight.sum(0) @ columns, weight.sum(1) @ rows]) / total
-
-
 def _mean(values: Sequence[Tensor]) -> Tensor:
     return sum(values[1:], start=values[0]) / len(values)
 
 
-def _translated(translate: Translator, view: View, camera_T_parent: Array) -> NDArray[np.float32]:
+def _translated(translate: Translator, view: View, camera_T_parent: Array) -> Picture:
+    """The reference (3, H, W) of a view."""
     image, mask = cut_out(view)
     renderer = view.levels[1].renderer
     renderer.draw(camera_T_parent @ view.parent_T_link)
-    return translate(image, mask, part=renderer.part, colours=renderer.mesh.colours)
+    translated = translate(image, mask, part=renderer.part, colours=renderer.mesh.colours)
+    return np.moveaxis(translated, -1, 0)

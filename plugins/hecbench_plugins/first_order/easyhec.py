@@ -22,7 +22,8 @@ from hecbench.recording import Recording
 from hecbench_plugins.first_order.backend import Backend
 from hecbench_plugins.first_order.descent import AdamSettings, Verdict, answer, descend
 from hecbench_plugins.first_order.hemisphere import best_on_hemisphere
-from hecbench_plugins.first_order.masks import MaskMode, MaskTarget, mask_drawers
+from hecbench_plugins.first_order.losses import SquaredError
+from hecbench_plugins.first_order.masks import MaskMode, mask_drawers, mask_of
 from hecbench_plugins.first_order.poses import LogVector
 from hecbench_plugins.render_views import prepare
 
@@ -63,13 +64,14 @@ class EasyHeC:
         else:
             start = se3.inverse(recording.initial_parent_T_camera)
         drawers = mask_drawers(recording, views, self.masks, self.backend)
-        targets = [MaskTarget(view, drawer) for view, drawer in zip(views, drawers, strict=True)]
+        ceiling = 1.0 if self.masks == "per_link" else np.inf
+        errors = [
+            SquaredError(mask_of(view)[None], drawer, ceiling)
+            for view, drawer in zip(views, drawers, strict=True)
+        ]
 
         def objective(pictures: Sequence[Tensor], camera_T_parent: Array) -> Verdict:
-            losses = [
-                target.squared_error(picture[0].clamp(max=1) if self.masks == "per_link" else picture[0])
-                for target, picture in zip(targets, pictures, strict=True)
-            ]
+            losses = [error(picture) for error, picture in zip(errors, pictures, strict=True)]
             return Verdict(sum(losses[1:], start=losses[0]) / len(losses), "masks")
 
         run = descend(

@@ -27,9 +27,10 @@ from hecbench.recording import Recording
 from hecbench_plugins.first_order.backend import Backend
 from hecbench_plugins.first_order.descent import AdamSettings, Verdict, answer, descend
 from hecbench_plugins.first_order.drawing import Drawer
-from hecbench_plugins.first_order.masks import MaskTarget, mask_drawers
+from hecbench_plugins.first_order.losses import SquaredError
+from hecbench_plugins.first_order.masks import mask_drawers, mask_of
 from hecbench_plugins.first_order.poses import Increment, PoseNumbers
-from hecbench_plugins.render_views import prepare
+from hecbench_plugins.render_views import Picture, prepare
 
 Array = NDArray[np.float64]
 
@@ -57,9 +58,8 @@ class IPE:
             raise Refusal("ipe needs a start: initial_parent_T_camera, or --init FILE")
         _, views = prepare(recording)
         drawers = mask_drawers(recording, views, "zbuffered", self.backend)
-        targets = [MaskTarget(view, drawer) for view, drawer in zip(views, drawers, strict=True)]
         numbers = Increment(se3.inverse(recording.initial_parent_T_camera))
-        losses = _Losses(targets, drawers, numbers, self.gamma)
+        losses = _Losses([mask_of(view) for view in views], drawers, numbers, self.gamma)
         run = descend(drawers, numbers, losses, AdamSettings(self.iterations, _RATE))
         weights = None if losses.weights is None else losses.weights.tolist()
         return answer(run, views, drawers, run.last, {"weights": weights})
@@ -70,20 +70,20 @@ class _Losses:
 
     def __init__(
         self,
-        targets: Sequence[MaskTarget],
+        masks: Sequence[Picture],
         drawers: Sequence[Drawer],
         numbers: PoseNumbers,
         gamma: float | None,
     ) -> None:
         self.weights: Array | None = None
-        self._targets, self._drawers, self._numbers = targets, drawers, numbers
-        self._distances = [_distance(target, gamma) for target in targets]
+        self._drawers, self._numbers = drawers, numbers
+        self._errors = [SquaredError(mask[None], at) for mask, at in zip(masks, drawers, strict=True)]
+        self._pixels = [float(mask.sum(dtype=float)) for mask in masks]
+        self._distances = [_distance(mask, gamma) for mask in masks]
 
     def __call__(self, pictures: Sequence[Tensor], camera_T_parent: Array) -> Verdict:
-        per_view = [
-            self._of_view(*one)
-            for one in zip(pictures, self._targets, self._drawers, self._distances, strict=True)
-        ]
+        views = zip(pictures, self._errors, self._pixels, self._drawers, self._distances, strict=True)
+        per_view = [self._of_view(*view) for view in views]
         losses = [sum(column[1:], start=column[0]) / len(per_view) for column in zip(*per_view, strict=True)]
         if self.weights is None:
             self.weights = self._balanced(losses, pictures)
@@ -91,15 +91,11 @@ class _Losses:
         return Verdict(first * losses[0] + second * losses[1] + third * losses[2], "masks")
 
     def _of_view(
-        self, picture: Tensor, target: MaskTarget, drawer: Drawer, distance: Tensor
+        self, picture: Tensor, error: SquaredError, pixels: float, drawer: Drawer, distance: Tensor
     ) -> tuple[Tensor, Tensor, Tensor]:
-        drawn = picture[0]
+        """Mask, distance and appearance."""
         far = distance[drawer.box.slices] if drawer.box else distance[:0, :0]
-        return (
-            target.squared_error(drawn),
-            (drawn * far).sum(),
-            (drawn.sum() - target.pixels).abs(),
-        )
+        return error(picture), (picture[0] * far).sum(), (picture.sum() - pixels).abs()
 
     def _balanced(self, losses: Sequence[Tensor], pictures: Sequence[Tensor]) -> Array:
         mask, distance, appearance = (self._steepness(loss, pictures) for loss in losses)
@@ -125,11 +121,11 @@ class _Losses:
         return float(np.linalg.norm(np.concatenate(by_numbers)))
 
 
-def _distance(target: MaskTarget, gamma: float | None) -> Tensor:
+def _distance(mask: Picture, gamma: float | None) -> Tensor:
     """Distance (H, W) of every pixel to the mask, over gamma."""
     import cv2
 
-    outside = (target.mask <= 0.5).astype(np.uint8)
+    outside = (mask <= 0.5).astype(np.uint8)
     unit = gamma if gamma is not None else float(np.hypot(*outside.shape)) / 2
     return torch.from_numpy(
         cv2.distanceTransform(outside, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) / np.float32(unit)

@@ -12,15 +12,18 @@ _jit = numba.njit(cache=True, nogil=True, boundscheck=False)
 
 
 @_jit
-def paint(face, face_part, colours, pixels, parts, mix, area, out):
-    """Add the anti-aliased robot to `out` (C, h, w), which shows the rectangle `area` (x0, x1, y0, y1 inclusive).
+def paint(face, face_part, colours, pixels, parts, mix, area, fresh, out):
+    """Draw the anti-aliased robot into `out` (C, h, w), which shows the rectangle `area` (x0, x1, y0, y1 inclusive).
 
-    `colours` (P + 1, C), the last the background's, which `out` shows already; `pixels` (N, 2), `parts` (N, 2) and
-    `mix` (N, 4) as in `Crossings`.
+    `colours` (P + 1, C), the last the background's; `pixels` (N, 2), `parts` (N, 2) and `mix` (N, 4) as in
+    `Crossings`. If `fresh`, `out` is filled; otherwise it shows something, to which the robot is added.
     """
     width = face.shape[1]
     channels, background = colours.shape[1], len(colours) - 1
     x0, y0 = area[0], area[2]
+    if fresh:
+        for c in range(channels):
+            out[c] = colours[background, c]
     for y in range(out.shape[1]):
         for x in range(out.shape[2]):
             f = face[y0 + y, x0 + x]
@@ -86,3 +89,52 @@ def exponential(rotvec, rotation, jacobian):
             twice = w[i] * w[j] - one * square
             rotation[i, j] = one + first * hat[i][j] + second * twice
             jacobian[i, j] = one + second * hat[i][j] + third * twice
+
+
+@numba.njit(cache=True, nogil=True, boundscheck=False, fastmath={"reassoc", "contract", "nsz"})
+def squared_error(picture, reference, x0, y0, ceiling, slope):
+    """Sum of (I - R)^2 over the first channels of `picture` (C, h, w), as many as `reference` (D, H, W) has.
+
+    `x0`, `y0`: where the picture lies in the reference. Values above `ceiling` count as it. Fills `slope` (C, h, w).
+    """
+    total = 0.0
+    slope[len(reference) :] = 0.0
+    for c in range(len(reference)):
+        for y in range(picture.shape[1]):
+            for x in range(picture.shape[2]):
+                off = min(picture[c, y, x], ceiling) - reference[c, y0 + y, x0 + x]
+                slope[c, y, x] = 2 * off if picture[c, y, x] <= ceiling else 0.0
+                total += off * off
+    return total
+
+
+@_jit
+def geometry(mask, x0, y0, out):
+    """Sums over the pixels of `mask` (h, w), whose first lies at (x0, y0) px of the centroid's origin.
+
+    Fills `out` (4,): w, w x, w y of w = exp(mask) - 1, and sigmoid(mask) - 1/2; pixels at 0 add nothing.
+    """
+    out[:] = 0.0
+    whole, half = math.expm1(1.0), 1 / (1 + math.exp(-1.0)) - 0.5
+    for y in range(mask.shape[0]):
+        for x in range(mask.shape[1]):
+            value = mask[y, x]
+            if value == 0.0:
+                continue
+            weight, area = whole, half
+            if value != 1.0:
+                weight, area = math.expm1(value), 1 / (1 + math.exp(-value)) - 0.5
+            out[0] += weight
+            out[1] += weight * (x0 + x)
+            out[2] += weight * (y0 + y)
+            out[3] += area
+
+
+@_jit
+def geometry_slope(mask, x0, y0, by_sums, slope):
+    """The derivative by `mask` (h, w) of a loss that has `by_sums` (4,) by the sums of `geometry`, into `slope`."""
+    for y in range(mask.shape[0]):
+        for x in range(mask.shape[1]):
+            weight = math.exp(mask[y, x])
+            odds = by_sums[0] + by_sums[1] * (x0 + x) + by_sums[2] * (y0 + y)
+            slope[y, x] = weight * odds + by_sums[3] * weight / (1 + weight) ** 2

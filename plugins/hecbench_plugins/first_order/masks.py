@@ -1,20 +1,14 @@
-"""Masks of the views as a target: what a drawn mask costs within its box, and all that lies outside."""
+"""Masks of the robot, drawn and given."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from typing import Literal
 
-import numpy as np
-import torch
-from torch import Tensor
-from torch.nn.functional import mse_loss
-
 from hecbench.recording import Recording
 from hecbench_plugins.first_order.backend import Backend, drawer
 from hecbench_plugins.first_order.drawing import (
     MASK,
-    BoxSum,
     Drawer,
     link_mask_meshes,
     robot_name,
@@ -34,20 +28,6 @@ def mask_drawers(
     return [drawer(backend, meshes, MASK, view) for view in views]
 
 
-class MaskTarget:
-    """The mask of one view."""
-
-    def __init__(self, view: View, drawer: Drawer) -> None:
-        self.mask: Picture = view.levels[1].observed[..., 3]
-        self._drawer = drawer
-        self._tensor = torch.from_numpy(np.ascontiguousarray(self.mask))
-        self._squares = BoxSum(self.mask.astype(float) ** 2)
-        self.pixels = float(self.mask.sum(dtype=float))
-
-    def squared_error(self, drawn: Tensor) -> Tensor:
-        """Sum over all pixels of (drawn - mask)^2 for a drawn mask (h, w) of the drawer's box."""
-        box = self._drawer.box
-        if box is None:
-            return drawn.sum() + self._squares.total
-        inside = mse_loss(drawn, self._tensor[box.slices], reduction="sum")
-        return inside + self._squares.outside(box)
+def mask_of(view: View) -> Picture:
+    """The given mask (H, W) of a view, in [0, 1]."""
+    return view.levels[1].observed[..., 3]
