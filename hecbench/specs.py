@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Protocol, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hecbench.errors import InputError
 from hecbench.needs import Need as Need
@@ -202,12 +203,35 @@ class SegmenterSpec(Spec):
     factory: Callable[[], Callable[[Recording], Recording]]
 
 
+class Translator(Protocol):
+    """Turns a picture of the real robot into one as the renderer would draw it: flat colours on black."""
+
+    def __call__(
+        self,
+        image: NDArray[np.float32],
+        mask: NDArray[np.float32],
+        *,
+        part: NDArray[np.int32],
+        colours: NDArray[np.float64],
+    ) -> NDArray[np.float32]:
+        """The picture (H, W, 3) in [0, 1].
+
+        Args:
+            image: (H, W, 3) in [0, 1], undistorted, not cut out.
+            mask: (H, W) in [0, 1], the robot's.
+            part: (H, W) of the robot drawn at the current pose, -1 where it is not.
+            colours: (P, 3) of the parts in the robot's model.
+        """
+        ...
+
+
 @dataclass(frozen=True, kw_only=True)
 class TranslatorSpec(Spec):
-    """Image translation. `factory()` returns the translation function."""
+    """Image translation. One that `follows_pose` reads `part`, and is asked again as the pose improves."""
 
     kind: ClassVar[Kind] = Kind.TRANSLATOR
-    factory: Callable[[], Callable[..., Any]]
+    factory: Callable[[], Translator]
+    follows_pose: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)

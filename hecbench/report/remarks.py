@@ -22,6 +22,7 @@ from hecbench.report.scores import (
     ends_mm,
     known_ends,
     mean_mm,
+    not_as_published,
     paired,
     paper_name,
 )
@@ -125,12 +126,4 @@ def lost_robots(runs: Sequence[Estimate]) -> list[Remark]:
 
 def departures(runs: Sequence[Estimate]) -> list[Remark]:
     """Methods that were not run as their authors published them."""
-    said = []
-    for solver, found in by_solver(runs).items():
-        reasons = [
-            str(run.diagnostics["not_as_published"]) for run in found if "not_as_published" in run.diagnostics
-        ]
-        if reasons:
-            text = f"{solver} is not the published method in {len(reasons)} of {len(found)} runs, first: {reasons[0]}."
-            said.append(Remark(Verdict.DIFFERS, text))
-    return said
+    return [Remark(Verdict.DIFFERS, text) for text in not_as_published(runs)]

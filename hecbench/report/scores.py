@@ -194,3 +194,14 @@ def summary(runs: Sequence[Estimate]) -> tuple[str, ...]:
         number(ends[:, 1].mean() if len(ends) else None),
         rate(within(run, *SUCCESSES[0]) for run in runs),
     )
+
+
+def not_as_published(runs: Sequence[Estimate]) -> list[str]:
+    """For each method that was not run as its authors published it, how often, and the first reason."""
+    said = []
+    for solver, found in by_solver(runs).items():
+        reasons = [told for run in found if (told := run.diagnostics.get("not_as_published"))]
+        if reasons:
+            often = f"in {len(reasons)} of {len(found)} runs"
+            said.append(f"{solver} is not the published method {often}, first: {reasons[0]}.")
+    return said

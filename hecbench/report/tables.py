@@ -11,6 +11,7 @@ import numpy as np
 from hecbench import statistics
 from hecbench.estimate import Estimate, Status, best_first
 from hecbench.report.cells import ABSENT, NO_ANSWER, interval, number, percent
+from hecbench.report.scores import not_as_published
 from hecbench.statistics import Interval
 
 SUCCESS_MM, SUCCESS_RAD = 5.0, 0.01
@@ -119,6 +120,7 @@ def _level_table(group: Group) -> Table:
             "TRE: rms displacement of workspace points. Medians and rates count every run, one without an "
             "answer as infinitely wrong; the mean is over the answers. Ranks are shared where intervals overlap.",
             *_reasons(group.estimates),
+            *not_as_published(group.estimates),
         ),
     )
 
@@ -155,6 +157,7 @@ def _recording_table(title: str, estimates: Sequence[Estimate]) -> Table:
         "Held-out: rms prediction of samples left out in 5 folds, the target pose refitted by the ruler. "
         "Spread: rms deviation of the constant target pose over all samples, raw robot poses.",
         *_reasons(estimates),
+        *not_as_published(estimates),
     )
     return Table(title, ("solver", "status", "rank", *shown), rows, notes, left=2)
 

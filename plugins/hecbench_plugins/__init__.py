@@ -7,5 +7,6 @@ plugin_modules = (
     *submodules(__name__, "observers"),
     *submodules(__name__, "evaluators"),
     *submodules(__name__, "segmenters"),
+    *submodules(__name__, "translators"),
 )
 """Modules whose hooks belong to this package, imported one by one when plugins are listed."""

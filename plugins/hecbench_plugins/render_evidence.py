@@ -91,10 +91,7 @@ def answer(
     diagnostics["weakest_direction"] = [round(float(part), 3) for part in directions[:, 0]]
     parent_T_root = views[0].parent_T_link[0]
     other_side = parent_T_root @ _HALF_TURN @ se3.inverse(parent_T_root)
-    diagnostics["path"] = [
-        [stage, None if np.isnan(cost) else round(cost, 6), se3.log(se3.inverse(pose)).round(6).tolist()]
-        for stage, pose, cost in _thinned(trace.poses)
-    ]
+    diagnostics["path"] = told_path(trace.poses)
     diagnostics["overlap_from_the_other_side"] = overlap(views[:1], camera_T_parent @ other_side, trace)
     return Estimate(
         parent_T_camera,
@@ -107,10 +104,13 @@ def answer(
     )
 
 
-def _thinned(steps: list[tuple[str, Array, float]]) -> list[tuple[str, Array, float]]:
-    """At most `_PATH_STEPS` of the steps, evenly spaced, with the first and the last."""
-    kept = np.linspace(0, len(steps) - 1, min(_PATH_STEPS, len(steps)))
-    return [steps[i] for i in np.round(kept).astype(int)]
+def told_path(steps: list[tuple[str, Array, float]]) -> list[list[Any]]:
+    """Stage, cost and log of parent_T_camera of at most `_PATH_STEPS` of the steps, the first and last among them."""
+    kept = np.round(np.linspace(0, len(steps) - 1, min(_PATH_STEPS, len(steps)))).astype(int)
+    return [
+        [stage, None if np.isnan(cost) else round(cost, 6), se3.log(se3.inverse(pose)).round(6).tolist()]
+        for stage, pose, cost in (steps[i] for i in kept)
+    ]
 
 
 def _scaled(information: Array, camera_T_parent: Array, views: Sequence[View]) -> tuple[Array, Array]:

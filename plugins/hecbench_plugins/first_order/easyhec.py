@@ -1,0 +1,80 @@
+"""EasyHeC and the optimisation of EasyHeC++: the robot's mask by Adam on the se(3) logarithm of the pose.
+
+Chen et al. 2023, "EasyHeC: Accurate and automatic hand-eye calibration via differentiable rendering and space
+exploration", RA-L 8(11); Zheng et al. 2024, "EasyHeC++", IROS. Per view the sum over pixels of (S - S_ref)^2,
+averaged over views; Adam, rate 3e-3, weight decay 5e-4, 1000 steps, the last iterate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from torch import Tensor
+
+from hecbench import se3
+from hecbench.errors import Refusal
+from hecbench.estimate import Estimate
+from hecbench.recording import Recording
+from hecbench_plugins.first_order.backend import Backend
+from hecbench_plugins.first_order.descent import AdamSettings, Verdict, answer, descend
+from hecbench_plugins.first_order.hemisphere import best_on_hemisphere
+from hecbench_plugins.first_order.losses import SquaredError
+from hecbench_plugins.first_order.masks import MaskMode, mask_drawers, mask_of
+from hecbench_plugins.first_order.poses import LogVector
+from hecbench_plugins.render_views import prepare
+
+Array = NDArray[np.float64]
+
+_RATE, _WEIGHT_DECAY = 3e-3, 5e-4
+
+
+@dataclass(frozen=True)
+class EasyHeC:
+    """The options of the method.
+
+    Attributes:
+        masks: `per_link` draws every link alone, adds the masks and clamps them at 1, as the authors' code does;
+            `zbuffered` draws the whole robot at once. Both differ along contours between links only.
+        iterations: of Adam.
+        backend: which renderer draws.
+        search_start: begin with the best mask overlap on a hemisphere instead of the recording's start (EasyHeC++).
+    """
+
+    masks: MaskMode = "per_link"
+    iterations: int = 1000
+    backend: Backend = "cpu"
+    search_start: bool = False
+
+    def __call__(self, recording: Recording, *, rng: np.random.Generator) -> Estimate:
+        """Calibrate from the recording's start, or from a searched one."""
+        _, views = prepare(recording)
+        told: dict[str, Any] = {"masks": self.masks}
+        if self.search_start:
+            found = best_on_hemisphere(recording, views)
+            start = found.camera_T_parent
+            told |= {"start_overlap": found.overlap, "start_candidates": found.candidates}
+        elif recording.initial_parent_T_camera is None:
+            raise Refusal(
+                "easyhec needs a start: initial_parent_T_camera, or --init FILE; easyhecpp needs none"
+            )
+        else:
+            start = se3.inverse(recording.initial_parent_T_camera)
+        drawers = mask_drawers(recording, views, self.masks, self.backend)
+        ceiling = 1.0 if self.masks == "per_link" else np.inf
+        errors = [
+            SquaredError(mask_of(view)[None], drawer, ceiling)
+            for view, drawer in zip(views, drawers, strict=True)
+        ]
+
+        def objective(pictures: Sequence[Tensor], camera_T_parent: Array) -> Verdict:
+            losses = [error(picture) for error, picture in zip(errors, pictures, strict=True)]
+            return Verdict(sum(losses[1:], start=losses[0]) / len(losses), "masks")
+
+        run = descend(
+            drawers, LogVector(start), objective, AdamSettings(self.iterations, _RATE, _WEIGHT_DECAY)
+        )
+        return answer(run, views, drawers, run.last, told)

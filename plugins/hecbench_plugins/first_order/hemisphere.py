@@ -1,0 +1,84 @@
+"""A start without a guess, after EasyHeC++ (Zheng et al. 2024): the best mask overlap of cameras on a hemisphere.
+
+The authors' code is not published; what they sample is chosen here. Directions are spread evenly over the upper
+hemisphere around the base's vertical axis (Fibonacci's spiral, Gonzalez 2010), the camera upright. Distance and
+aim are not sampled: each camera is moved until centroid and area of its drawing are those of the mask.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hecbench import se3
+from hecbench.errors import Refusal
+from hecbench.recording import Mounting, Recording
+from hecbench_plugins import render_stages as stages
+from hecbench_plugins.render_views import View
+
+Array = NDArray[np.float64]
+
+DIRECTIONS = 500
+_FIRST_DISTANCE_M = 2.0
+_ROUNDS = 3
+_LEVEL = 4
+_HIGHEST = 0.98
+"""Sine of the elevation up to which "upright" says how a camera is turned."""
+
+
+@dataclass(frozen=True, eq=False)
+class HemisphereStart:
+    """The best camera, its overlap (mean intersection over union of the views) and how many were tried."""
+
+    camera_T_parent: Array
+    overlap: float
+    candidates: int
+
+
+def best_on_hemisphere(recording: Recording, views: Sequence[View]) -> HemisphereStart:
+    """Try every direction at a quarter of the pictures' size.
+
+    Raises:
+        Refusal: the camera sits on the robot, so that no hemisphere around the base holds it.
+    """
+    if recording.mounting is not Mounting.EYE_TO_HAND:
+        raise Refusal("cameras are sampled around the base: a start can be searched for eye_to_hand only")
+    middle = np.concatenate([view.parent_T_link[:, :3, 3] for view in views]).mean(0)
+    best, best_overlap, trace = np.eye(4), -1.0, stages.Trace()
+    for direction in _directions():
+        pose = _looking_at(middle, direction)
+        pose = stages.centroid_and_area(views, pose, trace, rounds=_ROUNDS)
+        overlap = _overlap(views, pose, trace)
+        if overlap > best_overlap:
+            best, best_overlap = pose, overlap
+    return HemisphereStart(best, best_overlap, DIRECTIONS)
+
+
+def _directions() -> Array:
+    """Unit vectors (DIRECTIONS, 3) from the robot to the camera, even in the sine of the elevation."""
+    n = np.arange(DIRECTIONS)
+    sine = _HIGHEST * (n + 0.5) / DIRECTIONS
+    azimuth = n * np.pi * (3 - np.sqrt(5))
+    cosine = np.sqrt(1 - sine**2)
+    return np.stack([cosine * np.cos(azimuth), cosine * np.sin(azimuth), sine], -1)
+
+
+def _looking_at(middle: Array, direction: Array) -> Array:
+    """camera_T_parent of an upright camera that looks at `middle`."""
+    right = np.cross(-direction, [0, 0, 1])
+    right /= np.linalg.norm(right)
+    camera_R_parent = np.stack([right, np.cross(-direction, right), -direction])
+    eye = middle + _FIRST_DISTANCE_M * direction
+    return se3.make(camera_R_parent, -camera_R_parent @ eye)
+
+
+def _overlap(views: Sequence[View], pose: Array, trace: stages.Trace) -> float:
+    values = []
+    for view in views:
+        at = stages.draw(view, _LEVEL, pose, trace)
+        drawn, seen = at.drawn(), at.observed[..., 3] > 0.5
+        values.append((drawn & seen).sum() / max((drawn | seen).sum(), 1))
+    return float(np.mean(values))

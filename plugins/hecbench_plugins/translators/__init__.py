@@ -1,0 +1,1 @@
+"""Image translation from real to simulated, one method per file."""
