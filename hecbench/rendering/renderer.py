@@ -269,12 +269,19 @@ class Renderer:
     @property
     def part(self) -> NDArray[np.int32]:
         """Part (H, W) seen at each pixel centre, -1 for the background; a new array."""
-        return np.where(self.face >= 0, self.mesh.face_part[self.face], np.int32(-1))
+        return self._seen(self.mesh.face_part)
 
     @property
     def link(self) -> NDArray[np.int32]:
         """Link (H, W) seen at each pixel centre, -1 for the background; a new array."""
-        return np.where(self.face >= 0, self._face_link[self.face], np.int32(-1))
+        return self._seen(self._face_link)
+
+    def _seen(self, of_face: Int) -> Int:
+        seen = np.full(self.face.shape, -1, np.int32)
+        left, right, top, bottom = self.box
+        area = (slice(top, bottom + 1), slice(left, right + 1))
+        seen[area] = np.where(self.face[area] >= 0, of_face[self.face[area]], -1)
+        return seen
 
     @property
     def depth(self) -> NDArray[np.float32]:
