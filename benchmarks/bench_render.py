@@ -119,7 +119,7 @@ def test_bench_derivative(benchmark, robot, ambient):
     """Against central differences averaged over 8 x 8 pixel phases: correlation 0.99, ratio within 2 %."""
     model, rng = load_robot(robot), np.random.default_rng(0)
     mesh = RenderMesh.of(model)
-    steps, scale = np.array([1e-4, 1e-4, 3e-4, 2e-4, 2e-4, 7.5e-4]), np.array([2, 2, 2, 1, 1, 1.0])
+    steps, scale = np.array([2e-4, 2e-4, 6e-4, 4e-4, 4e-4, 1.5e-3]), np.array([2, 2, 2, 1, 1, 1.0])
     found = []
 
     def compare():

@@ -289,10 +289,9 @@ def describe_crossings(
     `ends` (C, 4): the two pixels (flat) and their parts, -1 = background; `link` (C,) of the edge; `point` (C, 3) m
     on the edge in the camera frame; `gradient` (C, 3) px/m = dt/dpoint; `slope` (C,) columns per row (or rows per
     column); `mix` (C, 4): what each pixel takes of the other's colour and how that changes with t.
-    Where contours against the background cross both a row and a column next to a pixel, the axis that changes it more
-    counts alone: mostly both are the same line; likewise edges between parts. An edge at less than 45 degrees to its
-    pair counts only for pixels that nothing else of its kind changes. `taken` (4 H W,) is scratch, zero before and
-    after. Returns how many crossings are left.
+    Where contours cross both a row and a column next to a pixel, the axis that changes it more counts alone: mostly
+    both are the same line. An edge at less than 45 degrees to its pair counts only for pixels that nothing else
+    changes. `taken` (2 H W,) is scratch, zero before and after. Returns how many crossings are left.
     """
     height, width = face.shape
     size = height * width
@@ -328,16 +327,13 @@ def describe_crossings(
         slope[n] = k
         mix[n, 0], mix[n, 1] = half_plane(_HALF - t, min(abs(k), _ONE))
         mix[n, 2], mix[n, 3] = half_plane(t - _HALF, min(abs(k), _ONE))
-        line = 0 if min(ends[n, 2], ends[n, 3]) < 0 else 2
         if abs(k) <= _ONE:
-            taken[(line + axis) * size + p] += mix[n, 0]
-            taken[(line + axis) * size + q] += mix[n, 2]
+            taken[axis * size + p] += mix[n, 0]
+            taken[axis * size + q] += mix[n, 2]
     for n in range(count):
         axis = 0 if pair[n] < size else 1
-        line = 0 if min(ends[n, 2], ends[n, 3]) < 0 else 2
         for end in range(2):
-            here = taken[(line + axis) * size + ends[n, end]]
-            other = taken[(line + 1 - axis) * size + ends[n, end]]
+            here, other = taken[axis * size + ends[n, end]], taken[(1 - axis) * size + ends[n, end]]
             if abs(slope[n]) > _ONE:
                 mixed = here == _ZERO and other == _ZERO and abs(slope[n]) < _STEEPEST
             else:
@@ -346,8 +342,8 @@ def describe_crossings(
                 mix[n, 2 * end], mix[n, 2 * end + 1] = _ZERO, _ZERO
     for n in range(count):
         for end in range(2):
-            for line in range(4):
-                taken[line * size + ends[n, end]] = _ZERO
+            taken[ends[n, end]] = _ZERO
+            taken[size + ends[n, end]] = _ZERO
     kept = 0
     for n in range(count):
         if mix[n, 1] > _ZERO or mix[n, 3] > _ZERO:

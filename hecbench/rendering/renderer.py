@@ -100,7 +100,7 @@ class Renderer:
         self.painted = self.box.copy()
         self._background = np.full(4, np.nan, np.float32)
         self._best = np.zeros((2, *shape), np.int32)
-        self._taken = np.zeros(4 * self.width * self.height, np.float32)
+        self._taken = np.zeros(2 * self.width * self.height, np.float32)
         self._pair = np.zeros(capacity, np.int32)
         self._place = np.zeros((capacity, 2), np.float32)
         self._edge = np.zeros(capacity, np.int32)
