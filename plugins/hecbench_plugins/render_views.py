@@ -224,7 +224,7 @@ def shrink(picture: Picture, level: int) -> Picture:
     height, width = picture.shape[0] // level, picture.shape[1] // level
     whole = picture[: height * level, : width * level]
     small = cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)
-    return small.reshape(height, width, picture.shape[2])
+    return np.asarray(small.reshape(height, width, picture.shape[2]), np.float32)
 
 
 def foreground(image: Picture, where: str) -> Picture:
