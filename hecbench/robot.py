@@ -172,11 +172,17 @@ class RobotModel:
         kept = tuple(p for p in self.parts if not any(fnmatchcase(p.name, pattern) for pattern in patterns))
         return replace(self, parts=kept)
 
-    def with_tool(self, tool: RobotModel, flange: str, prefix: str) -> RobotModel:
-        """The model with a tool fixed to a link, its root at the link's frame; names get the prefix."""
+    def with_tool(
+        self, tool: RobotModel, flange: str, prefix: str, flange_T_tool: Array | None = None
+    ) -> RobotModel:
+        """The model with a tool fixed to a link, its root at flange_T_tool (identity if None); names get the prefix.
+
+        The tool may be a second arm: fixed to the root of the first one it stands where its base was measured.
+        """
         self.link_index(flange)
+        origin = np.eye(4) if flange_T_tool is None else flange_T_tool
         mount = Joint(
-            f"{prefix}mount", Motion.FIXED, flange, prefix + tool.links[0], np.eye(4), np.array([0, 0, 1.0])
+            f"{prefix}mount", Motion.FIXED, flange, prefix + tool.links[0], origin, np.array([0, 0, 1.0])
         )
         joints = (
             replace(

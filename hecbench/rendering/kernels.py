@@ -20,7 +20,10 @@ _STEEPEST = np.float32(2.0)
 """Columns per row from which an edge does not count as crossing a row: its place there says too little."""
 _BEFORE_BACKGROUND = np.float32(0.2)
 _BEFORE_ROBOT = np.float32(0.02)
-"""How much less near, relatively, an edge may be than the pixel it bounds: round parts fall away from the eye."""
+"""How much less near, relatively, an edge may be than the pixel it bounds: round parts fall away from the eye.
+
+Before another part of the robot the first holds as long as the edge is nearer than that part, else the second.
+"""
 
 _jit = numba.njit(fastmath=True, cache=True, nogil=True, boundscheck=False)
 
@@ -236,13 +239,14 @@ def find_crossings(
                     continue
                 zp, zq = depths[p], depths[q]
                 near_is_p = zp >= zq
-                tolerance = _BEFORE_BACKGROUND
+                nearest = max(zp, zq)
+                least = nearest * (_ONE - _BEFORE_BACKGROUND)
                 if fp >= 0 and fq >= 0:
-                    tolerance = _BEFORE_ROBOT
+                    least = min(max(least, min(zp, zq)), nearest * (_ONE - _BEFORE_ROBOT))
                     if face_link[fp if near_is_p else fq] != face_link[edge_faces[e, 0]]:
                         continue
                 depth = screen[2, i] + s * (screen[2, j] - screen[2, i])
-                if depth < max(zp, zq) * (_ONE - tolerance):
+                if depth < least:
                     continue
                 t = u - np.float32(cell)
                 key = axis * size + p

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hecbench.errors import InputError
-from hecbench.rendering import kernels
+from hecbench.rendering import kernels, shading
 from hecbench.rendering.mesh import Float, Int, RenderMesh
+from hecbench.rendering.smooth import Normals, normals
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,12 +65,15 @@ class Renderer:
         K: (3, 3) px in OpenCV's convention, pixel centres at integers.
         width: of the image, px.
         height: of the image, px.
+        ambient: None draws flat colours. A number in [0, 1] lights the robot by a lamp at the camera: colours times
+            ``ambient + (1 - ambient) * cosine`` of the angle between the surface's normal and the viewing ray.
     """
 
     mesh: RenderMesh
     K: ArrayLike
     width: int
     height: int
+    ambient: float | None = None
     box: Int = field(init=False)
     """x0, x1, y0, y1 (inclusive) of the pixels that the robot covered in the last `draw`."""
     painted: Int = field(init=False)
@@ -83,6 +87,8 @@ class Renderer:
             raise InputError(f"K must be a finite 3x3 matrix with positive focal lengths, is {K.tolist()}")
         if self.width < 2 or self.height < 2:
             raise InputError(f"an image of {self.width}x{self.height} px cannot be drawn")
+        if self.ambient is not None and not 0 <= self.ambient <= 1:
+            raise InputError(f"ambient is a share of the light between 0 and 1, is {self.ambient}")
         mesh, shape = self.mesh, (self.height, self.width)
         capacity = max(4096, self.width * self.height // 4)
         self._intrinsics = np.array([K[0, 0], K[0, 1], K[0, 2] + 0.5, K[1, 1], K[1, 2] + 0.5], np.float32)
@@ -106,6 +112,12 @@ class Renderer:
         self._mix = np.zeros((capacity, 4), np.float32)
         self._count = 0
         self._image = np.zeros((*shape, 4), np.float32)
+        self._camera_T_link = np.zeros((len(mesh.vertex_start) - 1, 3, 4), np.float32)
+        self._normals: Normals | None = None if self.ambient is None else normals(mesh)
+        self._shade = np.ones(shape, np.float32)
+        self._slide = np.zeros((*shape, 3) if self._normals else (0, 0, 3), np.float32)
+        self._derivative: Float | None = None
+        self._derived = self.box.copy()
         self.nearness = np.zeros(shape, np.float32)
         self.face = np.full(shape, -1, np.int32)
 
@@ -129,12 +141,13 @@ class Renderer:
                 f"expected {len(self.mesh.vertex_start) - 1} finite link poses, got shape {poses.shape}"
             )
         mesh = self.mesh
+        self._camera_T_link[:] = poses[:, :3]
         kernels.project(
             mesh.vertices,
             mesh.vertex_start,
             mesh.planes,
             mesh.face_start,
-            np.ascontiguousarray(poses[:, :3], np.float32),
+            self._camera_T_link,
             self._intrinsics,
             self._screen,
             self._front,
@@ -191,35 +204,84 @@ class Renderer:
 
     def image(self, colours: ArrayLike | None = None, background: ArrayLike = (0, 0, 0)) -> Float:
         """The anti-aliased picture (H, W, 4) of the last pose: RGB by part (P, 3), and coverage in [0, 1]."""
+        table = self._table(colours, background)
+        if not np.array_equal(table[-1], self._background):
+            self._image[:] = table[-1]
+            self._background = table[-1].copy()
+        face, face_part = self.face, self.mesh.face_part
+        edges = self._ends, self._mix, self._count, self.box, self.painted
+        if self._normals is None:
+            kernels.compose(face, face_part, table, *edges, self._image)
+        else:
+            self._light(self._normals)
+            shading.compose(face, face_part, table, self._shade, self._best, *edges, self._image)
+        return self._image
+
+    def image_derivative(self, colours: ArrayLike | None = None, background: ArrayLike = (0, 0, 0)) -> Float:
+        """How the last pose's RGB moves by a left perturbation [phi rad, rho m] of camera_T_robot: (H, W, 3, 6).
+
+        For the colours that `image` would be given. Edges move the pixels that they mix; with a lamp the surfaces
+        between them move too. Dense, and only as fast as that; `crossings` alone hold what flat colours need.
+        """
+        if self._derivative is None:
+            self._derivative = np.zeros((self.height, self.width, 3, 6), np.float32)
+        left, right, top, bottom = self._derived
+        self._derivative[max(0, top - 1) : bottom + 2, max(0, left - 1) : right + 2] = 0
+        self._derived = self.box.copy()
+        table, columns = self._table(colours, background), self.crossings.pose_columns()
+        if self._normals is not None:
+            self._light(self._normals)
+            shading.surface_rates(
+                self.face,
+                self.mesh.face_part,
+                self.nearness,
+                self._intrinsics,
+                self.box,
+                self._best,
+                table,
+                self._shade,
+                self._slide,
+                self._derivative,
+            )
+        shading.edge_rates(table, self._shade, self._ends, self._mix, columns, self._count, self._derivative)
+        return self._derivative
+
+    def _table(self, colours: ArrayLike | None, background: ArrayLike) -> Float:
+        """RGB and coverage (P + 1, 4) of the parts, last of the background."""
         table = np.zeros((len(self.mesh.part_names) + 1, 4), np.float32)
         table[:-1, :3] = self.mesh.colours if colours is None else colours
         table[:-1, 3] = 1
         table[-1, :3] = background
-        if not np.array_equal(table[-1], self._background):
-            self._image[:] = table[-1]
-            self._background = table[-1].copy()
-        kernels.compose(
-            self.face,
-            self.mesh.face_part,
-            table,
-            self._ends,
-            self._mix,
-            self._count,
+        return table
+
+    def _light(self, known: Normals) -> None:
+        shading.shade_pixels(
+            (self._screen, self.mesh.faces, self.face, self._face_link, known.vectors, known.faces),
+            self.nearness,
+            self._camera_T_link,
+            self._intrinsics,
+            np.float32(self.ambient or 0),
             self.box,
-            self.painted,
-            self._image,
+            self._shade,
+            self._slide,
         )
-        return self._image
 
     @property
     def part(self) -> NDArray[np.int32]:
         """Part (H, W) seen at each pixel centre, -1 for the background; a new array."""
-        return np.where(self.face >= 0, self.mesh.face_part[self.face], np.int32(-1))
+        return self._seen(self.mesh.face_part)
 
     @property
     def link(self) -> NDArray[np.int32]:
         """Link (H, W) seen at each pixel centre, -1 for the background; a new array."""
-        return np.where(self.face >= 0, self._face_link[self.face], np.int32(-1))
+        return self._seen(self._face_link)
+
+    def _seen(self, of_face: Int) -> Int:
+        seen = np.full(self.face.shape, -1, np.int32)
+        left, right, top, bottom = self.box
+        area = (slice(top, bottom + 1), slice(left, right + 1))
+        seen[area] = np.where(self.face[area] >= 0, of_face[self.face[area]], -1)
+        return seen
 
     @property
     def depth(self) -> NDArray[np.float32]:

@@ -19,8 +19,11 @@ Array = NDArray[np.float64]
 _BLIND = 1e-12
 _PATH_STEPS = 40
 _NEAR_PX = 2.0
-_ROUGHNESS = 1.09
-"""Measured error over the Cramer-Rao bound: a sampled picture moves less smoothly than its derivative says."""
+_ROUGHNESS = 1.08
+"""Error over the sigma of the bare information: a sampled picture moves less smoothly than its derivative says.
+
+Measured on 100 scenes of `synthetic` MP, seed 11, noise 0.05, no mask (1.08 +- 0.03); not derived.
+"""
 _HALF_TURN = np.diag([-1.0, -1.0, 1.0, 1.0])
 """About the root link's vertical axis: from there a symmetric arm looks much the same."""
 

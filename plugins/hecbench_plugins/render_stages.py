@@ -226,7 +226,7 @@ class Photometry:
             self._hide(at, image)
             area = (slice(box[2], box[3] + 1), slice(box[0], box[1] + 1))
             kernels.huber_slope(image[area], observed[area], self.huber, slope[area])
-        self.residuals[index] = (image - observed)[area]
+        self.residuals[index] = image[area] - observed[area]
         crossings = renderer.crossings
         change = _change(at, table)[:, self.channels]
         kernels.normal_equations(

@@ -219,9 +219,12 @@ def shrink(picture: Picture, level: int) -> Picture:
     """Means over squares of `level` pixels of a picture (H, W, C); a rest at the border is left out."""
     if level == 1:
         return np.ascontiguousarray(picture)
+    import cv2
+
     height, width = picture.shape[0] // level, picture.shape[1] // level
     whole = picture[: height * level, : width * level]
-    return np.asarray(whole.reshape(height, level, width, level, -1).mean((1, 3)), np.float32)
+    small = cv2.resize(whole, (width, height), interpolation=cv2.INTER_AREA)
+    return np.asarray(small.reshape(height, width, picture.shape[2]), np.float32)
 
 
 def foreground(image: Picture, where: str) -> Picture:
@@ -256,7 +259,8 @@ def hidden_by_others(
     """
     import cv2
 
-    off = np.abs(cv2.blur(image, (5, 5)) - background).max(-1) > _BACKGROUND_SPREAD
+    red, green, blue = (np.abs(cv2.blur(image, (5, 5)) - background) > _BACKGROUND_SPREAD).transpose(2, 0, 1)
+    off = red | green | blue
     other = (off & (mask < 0.5)).astype(np.uint8)
     thick = cv2.morphologyEx(other, cv2.MORPH_OPEN, np.ones((_SMALLEST_HIDING_PX,) * 2, np.uint8))
     if not thick.any() or thick.mean() > (mask > 0.5).mean():
