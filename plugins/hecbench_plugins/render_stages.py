@@ -5,8 +5,11 @@ All turn camera_T_parent by left perturbations [phi rad, rho m] in the camera fr
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -42,10 +45,27 @@ class Trace:
 
 def draw(view: View, level: int, camera_T_parent: Array, trace: Trace) -> Level:
     """Draw a view at a pose; returns its level."""
+    trace.renders += 1
+    return drawn(view, level, camera_T_parent)
+
+
+def drawn(view: View, level: int, camera_T_parent: Array) -> Level:
+    """The same for callers that count by themselves, as threads must."""
     at = view.levels[level]
     at.renderer.draw(camera_T_parent @ view.parent_T_link)
-    trace.renders += 1
     return at
+
+
+def draw_each(views: Sequence[View], work: Callable[[View], Level]) -> list[Level]:
+    """The levels that `work` draws of the views, several of them in threads."""
+    if len(views) == 1:
+        return [work(views[0])]
+    return list(_threads().map(work, views))
+
+
+@cache
+def _threads() -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(len(os.sched_getaffinity(0)))
 
 
 def centroid_and_area(views: Sequence[View], start: Array, trace: Trace, rounds: int = 6) -> Array:
@@ -91,8 +111,9 @@ def silhouette_step(
 
     def step(pose: Array) -> Step:
         A, b, cost, count = np.zeros((6, 6)), np.zeros(6), 0.0, 0
-        for view, distance in zip(views, distances, strict=True):
-            at = draw(view, level, pose, trace)
+        trace.renders += len(views)
+        levels = draw_each(views, lambda view: drawn(view, level, pose))
+        for at, distance in zip(levels, distances, strict=True):
             residual, jacobian = contour_rows(at.renderer.crossings, outer(at), distance)
             cost += kernels.row_weights(jacobian, residual, clip, A, b)
             count += len(residual)
@@ -187,15 +208,16 @@ class Photometry:
     def __call__(self, pose: Array) -> Step:
         A, b = np.zeros((self.unknowns, self.unknowns)), np.zeros(self.unknowns)
         cost, crossed = 0.0, 0
-        for index, view in enumerate(self.views):
-            at = self.draw(view, pose)
+        self.trace.renders += len(self.views)
+        levels = draw_each(self.views, lambda view: self.draw(view, pose))
+        for index, (view, at) in enumerate(zip(self.views, levels, strict=True)):
             crossed += len(at.renderer.crossings)
             cost += self._add(index, at, self.columns(view, at.renderer.crossings, pose), A, b)
         return (cost if crossed >= _FEWEST_CROSSINGS else np.inf), A, b
 
     def draw(self, view: View, pose: Array) -> Level:
         """Draw one view."""
-        return draw(view, self.level, pose, self.trace)
+        return drawn(view, self.level, pose)
 
     def columns(self, view: View, crossings: Crossings, pose: Array) -> Array:
         """How the crossings move by the unknowns (C, unknowns), px."""

@@ -66,7 +66,6 @@ class ExtendedPhotometry(stages.Photometry):
         camera_T_parent = pose.copy()
         camera_T_parent[:3, 3] /= self._scale()
         at.renderer.draw(camera_T_parent @ self._parent_T_link(view, 0.0))
-        self.trace.renders += 1
         return at
 
     def columns(self, view: View, crossings: Crossings, pose: Array) -> Array:
