@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
@@ -16,7 +17,6 @@ from hecbench_plugins.render_views import Kinematics, Level, View
 
 Array = NDArray[np.float64]
 
-_STEP_RAD = 1e-4
 _UNSEEN = 0.8
 """Share of the prior's standard deviation that must be left for an unknown to count as not observable."""
 
@@ -65,7 +65,7 @@ class ExtendedPhotometry(stages.Photometry):
         at.renderer.scale_focal(float(np.exp(self.value(Unknown.FOCAL).sum())))
         camera_T_parent = pose.copy()
         camera_T_parent[:3, 3] /= self._scale()
-        at.renderer.draw(camera_T_parent @ self._parent_T_link(view, 0.0))
+        at.renderer.draw(camera_T_parent @ self._parent_T_link(view))
         return at
 
     def columns(self, view: View, crossings: Crossings, pose: Array) -> Array:
@@ -88,20 +88,17 @@ class ExtendedPhotometry(stages.Photometry):
     def _scale(self) -> float:
         return float(np.exp(self.value(Unknown.SCALE).sum()))
 
-    def _parent_T_link(self, view: View, change: Array | float) -> Array:
+    def _parent_T_link(self, view: View) -> Array:
         offsets = self.value(Unknown.JOINTS)
         if not len(offsets):
             return view.parent_T_link
         assert self.kinematics is not None
-        return self.kinematics(view.joints_rad + offsets + change)
+        return self.kinematics(view.joints_rad + offsets)
 
     def _joint_twists(self, view: View) -> Array:
         """Left twists (J, L, 6) of parent_T_link per rad of every joint, the links scaled with the robot."""
-        twists = []
-        for step in _STEP_RAD * np.eye(len(view.joints_rad)):
-            after, before = self._parent_T_link(view, step), self._parent_T_link(view, -step)
-            twists.append(se3.log(after @ se3.inverse(before)) / (2 * _STEP_RAD))
-        scaled = np.array(twists)
+        assert self.kinematics is not None
+        scaled = self.kinematics.twists(view.joints_rad + self.value(Unknown.JOINTS))
         scaled[..., 3:] *= self._scale()
         return scaled
 
@@ -153,14 +150,17 @@ def solve(photometry: ExtendedPhotometry, start: Array, noise: float, rounds: in
     size = 1 / np.sqrt(np.diag(A))
     covariance = noise**2 * np.linalg.inv(A * np.outer(size, size)) * np.outer(size, size)
     sigmas = np.sqrt(np.diag(covariance)[6:])
-    found: dict[str, Any] = {
-        name: {
-            "value": float(value),
-            "sigma": float(sigma),
-            "observable": bool(sigma < _UNSEEN * prior_sigma),
-        }
-        for (_, name), value, sigma, prior_sigma in zip(
-            photometry.labels, values, sigmas, photometry.sigmas, strict=True
-        )
+    names = [name for _, name in photometry.labels]
+    return Solved(
+        stages.Descent(pose, cost, A, ended),
+        covariance[:6, :6],
+        told(names, values, sigmas, photometry.sigmas),
+    )
+
+
+def told(names: Sequence[str], values: Array, sigmas: Array, prior_sigmas: Array) -> dict[str, Any]:
+    """What was found for each unknown, and whether the pictures said anything about it beside the prior."""
+    return {
+        name: {"value": float(value), "sigma": float(sigma), "observable": bool(sigma < _UNSEEN * prior)}
+        for name, value, sigma, prior in zip(names, values, sigmas, prior_sigmas, strict=True)
     }
-    return Solved(stages.Descent(pose, cost, A, ended), covariance[:6, :6], found)

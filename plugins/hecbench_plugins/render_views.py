@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from hecbench import se3
 from hecbench.errors import InputError, Refusal
 from hecbench.recording import Recording
 from hecbench.rendering import Renderer, RenderMesh
@@ -23,6 +24,7 @@ LEVELS = (4, 2, 1)
 _COARSE_CELL_M = {8: 0.01, 4: 0.004, 2: 0.0015, 1: 0.0}
 _LEAST_MASK, _MOST_MASK = 1e-3, 0.95
 _BACKGROUND_SPREAD = 0.08
+_STEP_RAD = 1e-4
 _SMALLEST_HIDING_PX, _SOFT_EDGE_PX = 9, 2
 
 
@@ -76,7 +78,7 @@ class View:
 
 @dataclass(frozen=True)
 class Kinematics:
-    """parent_T_link (L, 4, 4) by the joints of one sample."""
+    """parent_T_link (..., L, 4, 4) by joints (..., J)."""
 
     model: RobotModel
     joint_names: tuple[str, ...]
@@ -85,6 +87,12 @@ class Kinematics:
     def checked(self, joints_rad: Array) -> Array:
         """The same of many samples (N, J); an `InputError` for joints beyond their limits."""
         return self.model.link_poses(joints_rad, self.joint_names, frame=self.parent)
+
+    def twists(self, joints_rad: Array) -> Array:
+        """Left twists (..., J, L, 6) of parent_T_link per rad of every joint, at joints (..., J)."""
+        steps = _STEP_RAD * np.eye(joints_rad.shape[-1])
+        after, before = self(joints_rad[..., None, :] + steps), self(joints_rad[..., None, :] - steps)
+        return np.asarray(se3.log(after @ se3.inverse(before)) / (2 * _STEP_RAD))
 
     def __call__(self, joints_rad: Array) -> Array:
         """Joints beyond their limits are taken at them."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,15 +19,13 @@ from hecbench_plugins.maskless.align import (
     limited,
     settled,
 )
+from hecbench_plugins.render_unknowns import told
 from hecbench_plugins.render_views import Kinematics
 
 Array = NDArray[np.float64]
 
 PRIOR_RAD = float(np.deg2rad(0.1))
 """Standard deviation of an arm's constant joint offsets about the nominal model."""
-_UNSEEN = 0.8
-"""Share of the prior's standard deviation that must be left for an offset to count as not observable."""
-_STEP_RAD = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,10 +51,9 @@ def with_joint_offsets(
     prior = np.r_[np.zeros(6), np.full(len(offsets), weight)]
 
     def compare() -> Round:
-        lines.parent_T_link = np.stack([kinematics(row + offsets) for row in joints])
-        return lines(
-            pose, step.spacing, twists=_twists(kinematics, joints + offsets, pose), radius_m=radius_m
-        )
+        lines.parent_T_link = kinematics(joints + offsets)
+        twists = kinematics.twists(joints + offsets) @ se3.adjoint(pose).T
+        return lines(pose, step.spacing, twists=list(twists), radius_m=radius_m)
 
     lines.learn(pose, step.spacing)
     found = compare()
@@ -74,19 +70,5 @@ def with_joint_offsets(
             break
     information = found.A + np.diag(prior)
     sigmas = np.sqrt(CORRELATED_POINTS * np.diag(np.linalg.inv(information))[6:])
-    extras = {
-        name: {"value": float(value), "sigma": float(sigma), "observable": bool(sigma < _UNSEEN * PRIOR_RAD)}
-        for name, value, sigma in zip(kinematics.joint_names, offsets, sigmas, strict=True)
-    }
+    extras = told(kinematics.joint_names, offsets, sigmas, np.full(len(offsets), PRIOR_RAD))
     return Offsets(Refined(pose, found, iteration, converged), information, extras)
-
-
-def _twists(kinematics: Kinematics, joints_rad: Array, camera_T_parent: Array) -> Sequence[Array]:
-    """Per view the left twists (J, L, 6) of the links in the camera frame per rad of every joint."""
-    steps = _STEP_RAD * np.eye(joints_rad.shape[1])
-    carried = se3.adjoint(camera_T_parent)
-    found = []
-    for row in joints_rad:
-        moved = [se3.log(kinematics(row + step) @ se3.inverse(kinematics(row - step))) for step in steps]
-        found.append(np.array(moved) / (2 * _STEP_RAD) @ carried.T)
-    return found
