@@ -1,7 +1,7 @@
 """Calibration from raw photographs: the figures of docs/maskless.md, each printed beside its bar.
 
-Run: ``HECBENCH_RECORDINGS=../shared/data make bench TEST_ARGS=benchmarks/bench_maskless.py`` (about forty minutes on two
-cores at full size); ``HECBENCH_BENCH_SCALE=0.1`` draws a tenth of the samples. ``hecbench run maskless_real`` and
+Run: ``HECBENCH_RECORDINGS=../shared/data make bench TEST_ARGS=benchmarks/bench_maskless.py`` (about forty minutes on
+two cores at full size); ``HECBENCH_BENCH_SCALE=0.1`` draws a tenth of the samples. ``hecbench run maskless_real`` and
 ``hecbench report`` give the same figures with intervals.
 """
 
