@@ -5,11 +5,8 @@ All turn camera_T_parent by left perturbations [phi rad, rho m] in the camera fr
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from functools import cache
 from typing import Any
 
 import numpy as np
@@ -18,6 +15,7 @@ from numpy.typing import NDArray
 from hecbench import se3
 from hecbench.rendering import Crossings
 from hecbench_plugins import render_kernels as kernels
+from hecbench_plugins import threads
 from hecbench_plugins.render_views import Level, View, signed_distance
 
 Array = NDArray[np.float64]
@@ -60,12 +58,7 @@ def draw_each(views: Sequence[View], work: Callable[[View], Level]) -> list[Leve
     """The levels that `work` draws of the views, several of them in threads."""
     if len(views) == 1:
         return [work(views[0])]
-    return list(_threads().map(work, views))
-
-
-@cache
-def _threads() -> ThreadPoolExecutor:
-    return ThreadPoolExecutor(len(os.sched_getaffinity(0)))
+    return threads.each(work, views)
 
 
 def centroid_and_area(views: Sequence[View], start: Array, trace: Trace, rounds: int = 6) -> Array:

@@ -48,7 +48,9 @@ def test_iteration_reaches_the_minimum_of_a_general_optimiser(mounting):
         start = np.concatenate([[0.02, -0.01, 0.03, 0.01, 0.0, -0.02], [0.01, 0.0, -0.01]])
         exact = {"xtol": 1e-15, "ftol": 1e-15, "gtol": 1e-15}
         best = least_squares(residuals, start, jacobian, method="lm", **exact).x
-        best -= np.linalg.lstsq(jacobian(best), residuals(best), rcond=None)[0]  # its stop feels only the cost
+        best -= np.linalg.lstsq(jacobian(best), residuals(best), rcond=None)[
+            0
+        ]  # its stop feels only the cost
         assert np.abs(best).max() < 1e-9
 
 

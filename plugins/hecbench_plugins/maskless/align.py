@@ -10,7 +10,6 @@ the place of the surroundings' histogram.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -19,7 +18,7 @@ from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.rendering import Renderer, RenderMesh
-from hecbench_plugins import scene_background
+from hecbench_plugins import scene_background, threads
 from hecbench_plugins.maskless import kernels
 from hecbench_plugins.maskless.canvas import Canvas, Images, shrunk_intrinsics
 
@@ -125,7 +124,6 @@ class Lines:
         canvas: at full size.
         level: canvas pixels per pixel.
         background: of the full canvas, None where it is not known.
-        threads: that share the views.
         parent_T_link: (N, L, 4, 4) m, the canvas' until somebody corrects the joints.
         renders: pictures drawn so far.
     """
@@ -134,7 +132,6 @@ class Lines:
     canvas: Canvas
     level: int
     background: Background | None
-    threads: int
     parent_T_link: Array = field(init=False)
     renders: int = field(default=0, init=False)
 
@@ -153,8 +150,7 @@ class Lines:
             shrunk = np.ascontiguousarray(small(image), np.uint8)
             return shrunk, np.asarray(cv2.GaussianBlur(shrunk, (0, 0), 0.8), np.uint8)
 
-        self._pool = ThreadPoolExecutor(self.threads)
-        pairs = list(self._pool.map(prepared, self.canvas.images))
+        pairs = threads.each(prepared, self.canvas.images)
         self._images, self._smooth = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
         whole = np.asarray(small(255 * self.canvas.valid.astype(np.uint8))) > 254
         self._valid = np.asarray(cv2.erode(whole.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0)
@@ -173,7 +169,7 @@ class Lines:
         self._mean_around = np.zeros(size, np.float32)
         self._covered = np.zeros((height, width), np.int16)
         self._buffers = [
-            _Buffers(self.mesh, K, width, height) for _ in range(min(self.threads, len(self.canvas)))
+            _Buffers(self.mesh, K, width, height) for _ in range(min(threads.COUNT, len(self.canvas)))
         ]
 
     def __call__(
@@ -226,7 +222,7 @@ class Lines:
                 self._learn(buffers, view, count, reach)
             return done
 
-        done = [row for rows in self._pool.map(share, range(len(self._buffers))) for row in rows]
+        done = [row for rows in threads.each(share, range(len(self._buffers))) for row in rows]
         self.renders += len(self.canvas)
         self._covered = np.asarray(sum(buffers.covered for buffers in self._buffers), np.int16)
         inside = np.sum([buffers.inside for buffers in self._buffers], 0)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from hecbench.errors import InputError, Refusal
 from hecbench.recording import CameraModel, Recording
+from hecbench_plugins import threads
 from hecbench_plugins.render_views import Kinematics
 
 Array = NDArray[np.float64]
@@ -73,7 +73,7 @@ def shrunk_intrinsics(K: Array, across: float, down: float) -> Array:
     return small
 
 
-def unfold(recording: Recording, kinematics: Kinematics, threads: int) -> Canvas:
+def unfold(recording: Recording, kinematics: Kinematics) -> Canvas:
     """Read and undistort the photographs of all samples with joints.
 
     Raises:
@@ -96,8 +96,7 @@ def unfold(recording: Recording, kinematics: Kinematics, threads: int) -> Canvas
         image = _eight_bit(np.asarray(recording.image(row)), f"samples[{row}]")
         return np.asarray(cv2.remap(image, *maps, cv2.INTER_LINEAR), np.uint8)
 
-    with ThreadPoolExecutor(threads) as pool:
-        images = np.stack(list(pool.map(one, rows)))
+    images = np.stack(threads.each(one, rows))
     if (shrink := int(np.ceil(images.shape[2] / _LARGEST_PX))) > 1:
         images, valid = _shrunk(images, valid, shrink)
         K = shrunk_intrinsics(K, 1 / shrink, 1 / shrink)

@@ -7,13 +7,12 @@ of them at once: the cost is linear in what is covered, so its change by a shift
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
-
 import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.rendering import Renderer, RenderMesh
+from hecbench_plugins import threads
 from hecbench_plugins.guess_free import ViewSphere, best_apart, look_at
 from hecbench_plugins.maskless.canvas import Canvas, shrunk_intrinsics
 
@@ -33,7 +32,6 @@ def starts(
     foreground: NDArray[np.float32],
     sphere: ViewSphere,
     count: int,
-    threads: int,
 ) -> list[Array]:
     """The best camera_T_parent (4, 4), best first, distinct, for the search to begin at.
 
@@ -43,19 +41,16 @@ def starts(
         foreground: (N, H, W) how unlike the background each pixel is.
         sphere: directions and rolls to try.
         count: how many to return.
-        threads: that share the poses.
     """
     views = np.unique(np.linspace(0, len(canvas) - 1, _VIEWS).round().astype(int))
     middle, span = _moving(canvas)
-    shifts = [_Shifts(mesh, canvas.subset(views), foreground[views]) for _ in range(threads)]
+    shifts = [_Shifts(mesh, canvas.subset(views), foreground[views]) for _ in range(threads.COUNT)]
     centre = np.array([0.0, 0.0, 1.0])
     rotations = sphere.rotations()
     poses = np.concatenate([look_at(rotations, middle, centre, factor * span) for factor in _DISTANCES])
-    with ThreadPoolExecutor(threads) as pool:
-        shares = np.array_split(poses, threads)
-        rows = [
-            row for share in pool.map(lambda s, p: [s(pose) for pose in p], shifts, shares) for row in share
-        ]
+    pairs = zip(shifts, np.array_split(poses, threads.COUNT), strict=True)
+    shares = threads.each(lambda pair: [pair[0](pose) for pose in pair[1]], pairs)
+    rows = [row for share in shares for row in share]
     found = [pose for pose, _ in rows]
     return [found[i] for i in best_apart(found, [-cost for _, cost in rows], count, _APART)]
 

@@ -10,7 +10,6 @@ from the best draws that are far from each other.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.rendering import Renderer, RenderMesh
+from hecbench_plugins import threads
 from hecbench_plugins.maskless import kernels
 from hecbench_plugins.maskless.canvas import Canvas, shrunk_intrinsics
 
@@ -83,7 +83,6 @@ class Score:
         mesh: RenderMesh,
         canvas: Canvas,
         foreground: NDArray[np.float32] | None,
-        threads: int,
         rng: np.random.Generator,
     ) -> None:
         """`foreground` (N, H, W): how much each pixel of the canvas differs from the background, None if unknown."""
@@ -110,8 +109,7 @@ class Score:
         self._materials = int(material.max()) + 1
         self._face_material = material.reshape(-1)[mesh.face_part].astype(np.int32)
         K = shrunk_intrinsics(canvas.K, *factors)
-        self._renderers = [Renderer(mesh, K, *size) for _ in range(threads)]
-        self._pool = ThreadPoolExecutor(threads)
+        self._renderers = [Renderer(mesh, K, *size) for _ in range(threads.COUNT)]
 
     def limit_region(self, camera_T_parents: Array) -> None:
         """Count mutual information only where some of these poses (n, 4, 4) put the robot, and a little around it.
@@ -132,7 +130,8 @@ class Score:
         """Costs (n,) of poses (n, 4, 4)."""
         self.evaluations += len(camera_T_parents)
         shares = np.array_split(np.asarray(camera_T_parents), len(self._renderers))
-        return np.concatenate(list(self._pool.map(self._costs, self._renderers, shares)))
+        pairs = zip(self._renderers, shares, strict=True)
+        return np.concatenate(threads.each(lambda pair: self._costs(*pair), pairs))
 
     def _costs(self, renderer: Renderer, poses: Array) -> Array:
         views = len(self._canvas)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -71,13 +70,12 @@ class Photographs:
     canvas: Canvas
     few: Canvas
     background: Background | None
-    threads: int
     renders: int = 0
     descents: int = 0
     _searched: dict[Step, Lines] = field(default_factory=dict)
 
     @staticmethod
-    def of(recording: Recording, threads: int) -> Photographs:
+    def of(recording: Recording) -> Photographs:
         """Read and undistort them.
 
         Raises:
@@ -85,13 +83,13 @@ class Photographs:
         """
         try:
             kinematics, meshes = moving_robot(recording)
-            canvas = unfold(recording, kinematics, threads)
+            canvas = unfold(recording, kinematics)
         except InputError as error:
             raise Refusal(str(error)) from error
         few = canvas.subset(np.unique(np.linspace(0, len(canvas) - 1, _SEARCH_VIEWS).round().astype(int)))
         fixed = recording.mounting is Mounting.EYE_TO_HAND and len(canvas) >= scene_background.FEWEST_VIEWS
         background = Background.of(canvas.images) if fixed else None
-        return Photographs(kinematics, meshes, canvas, few, background, threads)
+        return Photographs(kinematics, meshes, canvas, few, background)
 
     def foreground(self) -> NDArray[np.float32] | None:
         """How unlike the background each pixel of the few is (n, H, W), None where that is not known."""
@@ -102,9 +100,7 @@ class Photographs:
     def lines(self, step: Step, canvas: Canvas) -> Lines:
         """The views of a canvas at the size of a step."""
         background = self.background if step.background else None
-        return Lines(
-            self.meshes[min(step.level, max(self.meshes))], canvas, step.level, background, self.threads
-        )
+        return Lines(self.meshes[min(step.level, max(self.meshes))], canvas, step.level, background)
 
     def refined(self, camera_T_parent: Array) -> Refined:
         """All steps but the last from a pose of the search, on the few."""
@@ -128,21 +124,19 @@ class Maskless:
         restarts: descents of the search in a ball before it is given up.
         least_sharp: share of contour points that the images must confirm for an end to be believed.
         free: the cameras that are tried when no start is to be used.
-        threads: that share the views.
     """
 
     joints: bool = False
     restarts: int = 6
     least_sharp: float = 0.3
     free: ViewSphere | None = None
-    threads: int = len(os.sched_getaffinity(0))
 
     def __call__(self, recording: Recording, *, rng: np.random.Generator) -> Estimate:
         """Calibrate from the photographs alone, about the recording's start unless the search is free."""
         start = recording.initial_parent_T_camera
         if start is None and self.free is None:
             raise Refusal("a start is needed: initial_parent_T_camera, or --init FILE")
-        photographs = Photographs.of(recording, self.threads)
+        photographs = Photographs.of(recording)
         if self.free is not None and photographs.background is None:
             raise Refusal(
                 f"without masks a start is found for a fixed camera in {scene_background.FEWEST_VIEWS} photographs or"
@@ -161,7 +155,7 @@ class Maskless:
     def _find(self, photographs: Photographs, start: Array | None, rng: np.random.Generator) -> Candidate:
         """The first end that the images confirm, or the best of all descents."""
         few, foreground = photographs.few, photographs.foreground()
-        score = Score(photographs.meshes[SEARCH_LEVEL], few, foreground, self.threads, rng)
+        score = Score(photographs.meshes[SEARCH_LEVEL], few, foreground, rng)
         best: Candidate | None = None
         for place in self._places(photographs, start, foreground):
             for coarse, _ in search(score, place.start, place.ball, place.restarts, rng):
@@ -186,7 +180,7 @@ class Maskless:
         """Where to search, in this order."""
         if self.free is not None and foreground is not None:
             mesh = photographs.meshes[SEARCH_LEVEL]
-            found = starts(mesh, photographs.few, foreground, self.free, _FREE_STARTS, self.threads)
+            found = starts(mesh, photographs.few, foreground, self.free, _FREE_STARTS)
             return [Place(se3.inverse(pose), _FREE_BALL, 1) for pose in found]
         assert start is not None
         balls = (FAR,) if len(photographs.canvas) >= _FEWEST_FOR_FAR else (NEAR, FAR)

@@ -126,7 +126,7 @@ def test_large_photographs_are_shrunk(fixed_camera):
     K[:2, 2] += 1.5
     camera = replace(fixed_camera.camera, width=1920, height=1440, K=K)
     large = tuple(np.repeat(np.repeat(image, 4, 0), 4, 1) for image in fixed_camera.images)
-    canvas = unfold(replace(fixed_camera, camera=camera, images=large), kinematics, threads=1)
+    canvas = unfold(replace(fixed_camera, camera=camera, images=large), kinematics)
     assert canvas.images.shape == (4, 720, 960, 3)
     np.testing.assert_allclose(canvas.K[:2, :2], fixed_camera.camera.K[:2, :2] * 2)
     np.testing.assert_allclose(canvas.K[:2, 2], fixed_camera.camera.K[:2, 2] * 2 + 0.5)
