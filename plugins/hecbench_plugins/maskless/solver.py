@@ -121,13 +121,15 @@ class Maskless:
 
     Attributes:
         joints: solve for constant joint offsets too.
-        restarts: descents of the search in a ball before it is given up.
+        restarts: descents of the search in a ball, from one set of draws, before it is given up.
+        attempts: sets of draws, each with colours clustered anew.
         least_sharp: share of contour points that the images must confirm for an end to be believed.
         free: the cameras that are tried when no start is to be used.
     """
 
     joints: bool = False
     restarts: int = 6
+    attempts: int = 2
     least_sharp: float = 0.3
     free: ViewSphere | None = None
 
@@ -155,9 +157,9 @@ class Maskless:
     def _find(self, photographs: Photographs, start: Array | None, rng: np.random.Generator) -> Candidate:
         """The first end that the images confirm, or the best of all descents."""
         few, foreground = photographs.few, photographs.foreground()
-        score = Score(photographs.meshes[SEARCH_LEVEL], few, foreground, rng)
         best: Candidate | None = None
         for place in self._places(photographs, start, foreground):
+            score = Score(photographs.meshes[SEARCH_LEVEL], few, foreground, rng)
             for coarse, _ in search(score, place.start, place.ball, place.restarts, rng):
                 photographs.descents += 1
                 end = photographs.refined(se3.inverse(coarse))
@@ -168,9 +170,9 @@ class Maskless:
                     best = Candidate(end.camera_T_parent, sharp, place, path)
                 if sharp >= self.least_sharp:
                     break
+            photographs.renders += score.evaluations * len(few)
             if best is not None and best.sharp >= self.least_sharp:
                 break
-        photographs.renders += score.evaluations * len(few)
         assert best is not None
         return best
 
@@ -184,7 +186,7 @@ class Maskless:
             return [Place(se3.inverse(pose), _FREE_BALL, 1) for pose in found]
         assert start is not None
         balls = (FAR,) if len(photographs.canvas) >= _FEWEST_FOR_FAR else (NEAR, FAR)
-        return [Place(start, ball, self.restarts) for ball in balls]
+        return [Place(start, ball, self.restarts) for ball in balls for _ in range(self.attempts)]
 
     def _finish(self, photographs: Photographs, found: Candidate) -> Estimate:
         """The last steps on all photographs, and the evidence."""
