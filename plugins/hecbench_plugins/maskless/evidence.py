@@ -19,14 +19,19 @@ _DOUBTFUL = 0.5
 """Of the median share of confirmed contour: a photograph with less disagrees with the others."""
 
 
-def covariance(camera_T_parent: Array, last: Round, unknowns_A: Array) -> Array:
-    """(6, 6) of parent_T_camera's left perturbation.
+def covariance(camera_T_parent: Array, last: Round, prior: Array) -> Array:
+    """(6, 6) of parent_T_camera's left perturbation, the joints being off by constants that nobody knows.
 
     Contour points are correlated along the contour and share what is wrong with their photograph, so the information
     of the lines is divided by a factor: the mean of g' I^-1 g / 6 over the photographs, g the gradient that one
     photograph alone leaves at the common end and I its own information (the scores' variance over their
     expectation; Freedman 2006, "On the so-called Huber sandwich estimator"). With few photographs it stays near
-    `CORRELATED_POINTS`. What all photographs share (intrinsics, constant joint offsets) is not in it.
+    `CORRELATED_POINTS`. Errors of the intrinsics are not in it.
+
+    Args:
+        camera_T_parent: (4, 4).
+        last: the comparison there, with columns for the joints.
+        prior: (6 + J,) information about the camera, none, and the joints' offsets.
     """
     scores = [
         gradient @ np.linalg.solve(information + 1e-9 * np.trace(information) * np.eye(6), gradient)
@@ -35,7 +40,7 @@ def covariance(camera_T_parent: Array, last: Round, unknowns_A: Array) -> Array:
     ]
     freedom = 6.0 * (len(scores) - 1)
     factor = (_PRIOR_FREEDOM * CORRELATED_POINTS + sum(scores)) / (_PRIOR_FREEDOM + freedom)
-    seen_from_camera = factor * np.linalg.inv(unknowns_A)[:6, :6]
+    seen_from_camera = np.linalg.inv(last.A / factor + np.diag(prior))[:6, :6]
     carried = se3.adjoint(se3.inverse(camera_T_parent))
     found = carried @ seen_from_camera @ carried.T
     return np.asarray((found + found.T) / 2)
@@ -43,7 +48,7 @@ def covariance(camera_T_parent: Array, last: Round, unknowns_A: Array) -> Array:
 
 def answer(
     end: Refined,
-    information: Array,
+    covariance: Array,
     sample_ids: Sequence[str],
     path: Sequence[tuple[str, Array]],
     renders: int,
@@ -55,7 +60,7 @@ def answer(
     shares = {name: round(float(share), 3) for name, share in zip(sample_ids, last.view_sharp, strict=True)}
     return Estimate(
         se3.inverse(end.camera_T_parent),
-        covariance=covariance(end.camera_T_parent, last, information),
+        covariance=covariance,
         termination=Termination.CONVERGED if end.converged else Termination.MAX_ITERATIONS,
         iterations=end.iterations,
         renders=renders,

@@ -30,33 +30,31 @@ PRIOR_RAD = float(np.deg2rad(0.1))
 
 @dataclass(frozen=True, eq=False)
 class Offsets:
-    """Where the refinement ended with joint offsets, the information with the priors, and the offsets by joint."""
+    """Where the refinement ended with joint offsets, and the offsets by joint."""
 
     refined: Refined
-    information: Array
     extras: dict[str, Any]
 
 
+def compare(
+    lines: Lines, camera_T_parent: Array, kinematics: Kinematics, offsets: Array, step: Step, radius_m: float
+) -> Round:
+    """The comparison at a pose and joint offsets (J,) rad, with a column of the normal equations for each joint."""
+    joints = lines.canvas.joints_rad + offsets
+    lines.parent_T_link = kinematics(joints)
+    twists = kinematics.twists(joints) @ se3.adjoint(camera_T_parent).T
+    return lines(camera_T_parent, step.spacing, twists=list(twists), radius_m=radius_m)
+
+
 def with_joint_offsets(
-    lines: Lines,
-    camera_T_parent: Array,
-    kinematics: Kinematics,
-    step: Step,
-    radius_m: float,
+    lines: Lines, camera_T_parent: Array, kinematics: Kinematics, step: Step, radius_m: float
 ) -> Offsets:
     """Gauss-Newton over the camera and one offset per joint, the prior weighed as the correlated points it equals."""
-    joints = lines.canvas.joints_rad
-    offsets, pose, converged, iteration = np.zeros(joints.shape[1]), camera_T_parent, False, 0
-    weight = CORRELATED_POINTS / PRIOR_RAD**2
-    prior = np.r_[np.zeros(6), np.full(len(offsets), weight)]
-
-    def compare() -> Round:
-        lines.parent_T_link = kinematics(joints + offsets)
-        twists = kinematics.twists(joints + offsets) @ se3.adjoint(pose).T
-        return lines(pose, step.spacing, twists=list(twists), radius_m=radius_m)
-
+    offsets = np.zeros(lines.canvas.joints_rad.shape[1])
+    pose, converged, iteration = camera_T_parent, False, 0
+    prior = CORRELATED_POINTS * prior_information(len(offsets))
     lines.learn(pose, step.spacing)
-    found = compare()
+    found = compare(lines, pose, kinematics, offsets, step, radius_m)
     for iteration in range(1, 2 * step.rounds + 1):  # noqa: B007 the number of the last is told
         if found.points < FEWEST_POINTS:
             break
@@ -64,11 +62,15 @@ def with_joint_offsets(
         b = found.b - prior * np.r_[np.zeros(6), offsets]
         move = limited(np.linalg.solve(A + 1e-3 * np.diag(np.diag(found.A)) + 1e-9 * np.eye(len(A)), b))
         pose, offsets = se3.exp(move[:6]) @ pose, offsets + move[6:]
-        found = compare()
+        found = compare(lines, pose, kinematics, offsets, step, radius_m)
         converged = settled(found, move)
         if converged:
             break
-    information = found.A + np.diag(prior)
-    sigmas = np.sqrt(CORRELATED_POINTS * np.diag(np.linalg.inv(information))[6:])
+    sigmas = np.sqrt(CORRELATED_POINTS * np.diag(np.linalg.inv(found.A + np.diag(prior)))[6:])
     extras = told(kinematics.joint_names, offsets, sigmas, np.full(len(offsets), PRIOR_RAD))
-    return Offsets(Refined(pose, found, iteration, converged), information, extras)
+    return Offsets(Refined(pose, found, iteration, converged), extras)
+
+
+def prior_information(joints: int) -> Array:
+    """Of the camera's six numbers, none, and of every joint offset (6 + joints,)."""
+    return np.concatenate([np.zeros(6), np.full(joints, 1 / PRIOR_RAD**2)])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +19,7 @@ from hecbench_plugins.maskless import evidence
 from hecbench_plugins.maskless.align import FEWEST_POINTS, Background, Lines, Refined, Step, refine, schedule
 from hecbench_plugins.maskless.canvas import Canvas, unfold
 from hecbench_plugins.maskless.free import starts
-from hecbench_plugins.maskless.offsets import with_joint_offsets
+from hecbench_plugins.maskless.offsets import compare, prior_information, with_joint_offsets
 from hecbench_plugins.maskless.search import SEARCH_LEVEL, Ball, Score, search
 from hecbench_plugins.render_views import Kinematics, moving_robot
 
@@ -202,15 +203,16 @@ class Maskless:
         left_out_m = _TOOL_M if _carries_something(lines, end, last.spacing) else 0.0
         if left_out_m:
             end = refine(lines, end.camera_T_parent, last, left_out_m)
-        information, extras = end.last.A, {}
+        extras: dict[str, Any] = {}
+        kinematics, nominal = photographs.kinematics, np.zeros(canvas.joints_rad.shape[1])
         if self.joints:
-            with_offsets = with_joint_offsets(
-                lines, end.camera_T_parent, photographs.kinematics, last, left_out_m
-            )
-            end, information, extras = with_offsets.refined, with_offsets.information, with_offsets.extras
+            solved = with_joint_offsets(lines, end.camera_T_parent, kinematics, last, left_out_m)
+            end, extras, judged = solved.refined, solved.extras, solved.refined.last
+        else:
+            judged = compare(lines, end.camera_T_parent, kinematics, nominal, last, left_out_m)
         return evidence.answer(
             end,
-            information,
+            evidence.covariance(end.camera_T_parent, judged, prior_information(len(nominal))),
             canvas.sample_ids,
             path,
             photographs.renders + lines.renders,
