@@ -177,8 +177,8 @@ def test_bench_start_levels(benchmark, level):
     rows, seconds = benchmark.pedantic(solve_level, (level, count(200)), rounds=1)
     success = ((rows[:, 1] < 5) & (rows[:, 2] < 0.01)).sum()
     print(
-        f"\n{level}: {success} of {len(rows)} (all), mean camera_T_parent {np.nanmean(rows[:, 0]):.4f} mm (0.05), rotation"
-        f" {np.nanmean(rows[:, 2]):.1e} rad (1e-4), median {seconds:.2f} s (0.3)"
+        f"\n{level}: {success} of {len(rows)} (all), mean camera_T_parent {np.nanmean(rows[:, 0]):.4f} mm (0.05),"
+        f" rotation {np.nanmean(rows[:, 2]):.1e} rad (1e-4), median {seconds:.2f} s (0.3)"
     )
 
 
@@ -189,7 +189,8 @@ def test_bench_mismatch(benchmark, level):
     floor = np.mean([synthetic.correspondence_floor_mm(level, index, 0) for index in answered.tolist()])
     mean = rows[answered, 0].mean()
     print(
-        f"\n{level}: {len(answered)} of {len(rows)} answered, mean {mean:.1f} mm, floor {floor:.1f} mm, ratio {mean / floor:.2f} (1.2)"
+        f"\n{level}: {len(answered)} of {len(rows)} answered, mean {mean:.1f} mm, floor {floor:.1f} mm,"
+        f" ratio {mean / floor:.2f} (1.2)"
     )
 
 
