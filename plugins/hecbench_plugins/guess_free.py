@@ -22,13 +22,11 @@ from hecbench.errors import Refusal, SolverFailure
 from hecbench.estimate import Estimate
 from hecbench.recording import Mounting, Recording
 from hecbench.rendering import Renderer, RenderMesh
-from hecbench.specs import Need
 from hecbench_plugins import render_stages as stages
 from hecbench_plugins.guess_free_kernels import moments, shared_pixels
-from hecbench_plugins.render_gn import RenderGN
+from hecbench_plugins.render_gn import RenderGN, masks_else_photographs
 from hecbench_plugins.render_views import (
     Level,
-    NoMask,
     View,
     prepare,
     robot_and_meshes,
@@ -278,16 +276,11 @@ class GuessFree:
             raise Refusal(
                 "a start is searched for fixed cameras only: give initial_parent_T_camera, or --init FILE"
             )
-        try:
-            return self._by_masks(recording, rng)
-        except NoMask:
-            return self._without_masks(recording, rng)
-        except SolverFailure:
-            if Need.MASKS in recording.offers():
-                raise
-            return self._without_masks(recording, rng)
+        return masks_else_photographs(
+            recording, self._by_masks, lambda recording: self._without_masks(recording, rng)
+        )
 
-    def _by_masks(self, recording: Recording, rng: np.random.Generator) -> Estimate:
+    def _by_masks(self, recording: Recording) -> Estimate:
         _, views = prepare(recording)
         trace = stages.Trace()
         found = self._found(recording, views, trace)
@@ -295,7 +288,7 @@ class GuessFree:
             raise SolverFailure(
                 f"no camera on the view sphere explains the masks: the best overlaps by {found[0].overlap:.2f}"
             )
-        ends = self._ends(recording, self._rivals(found), rng)
+        ends = self._ends(recording, self._rivals(found))
         best = min(ends, key=lambda end: end.diagnostics["noise"])
         for other in ends:
             if self._contradicts(other, best):
@@ -336,15 +329,13 @@ class GuessFree:
         poses, scores = [start.camera_T_parent for start in near], [start.overlap for start in near]
         return [near[i] for i in best_apart(poses, scores, self.tries, self.rival_apart)]
 
-    def _ends(
-        self, recording: Recording, rivals: Sequence[Start], rng: np.random.Generator
-    ) -> list[Estimate]:
+    def _ends(self, recording: Recording, rivals: Sequence[Start]) -> list[Estimate]:
         """Where the solver ends from each start; raises the first failure when none ends well."""
         ends, failures = [], []
         for start in rivals:
             given = replace(recording, initial_parent_T_camera=se3.inverse(start.camera_T_parent))
             try:
-                ends.append(self.solver(given, rng=rng))
+                ends.append(self.solver.by_masks(given))
             except SolverFailure as failure:
                 failures.append(failure)
         if not ends:

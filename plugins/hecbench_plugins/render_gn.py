@@ -8,6 +8,7 @@ between pixel centres through which its contour must pass.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -69,16 +70,11 @@ class RenderGN:
         """Calibrate from the recording's start."""
         if recording.initial_parent_T_camera is None:
             raise Refusal("render_gn needs a start: initial_parent_T_camera, or --init FILE")
-        try:
-            return self._by_masks(recording)
-        except NoMask:
-            return self._without_masks(recording, rng)
-        except SolverFailure:
-            if Need.MASKS in recording.offers():
-                raise
-            return self._without_masks(recording, rng)
+        return masks_else_photographs(
+            recording, self.by_masks, lambda recording: self._without_masks(recording, rng)
+        )
 
-    def _by_masks(self, recording: Recording) -> Estimate:
+    def by_masks(self, recording: Recording) -> Estimate:
         """From given masks, or from those that a uniform background gives."""
         assert recording.initial_parent_T_camera is not None
         kinematics, views = prepare(recording)
@@ -182,6 +178,22 @@ class RenderGN:
         if violated > self.most_violated:
             return evidence.End("coverage", descent, coverage)
         return evidence.End("intervals", replace(descent, pose=pose), coverage)
+
+
+def masks_else_photographs(
+    recording: Recording,
+    by_masks: Callable[[Recording], Estimate],
+    by_photographs: Callable[[Recording], Estimate],
+) -> Estimate:
+    """By given masks or those of a uniform background; by the photographs where none were given and those fail."""
+    try:
+        return by_masks(recording)
+    except NoMask:
+        return by_photographs(recording)
+    except SolverFailure:
+        if Need.MASKS in recording.offers():
+            raise
+        return by_photographs(recording)
 
 
 def _calibrated(camera: CameraModel | None, found: Estimate) -> CameraModel:
