@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hecbench_datasets import maskless as suites
+from hecbench_plugins.guess_free import GuessFree
 from hecbench_plugins.render_gn import RenderGN
 
 from hecbench import se3
@@ -36,6 +37,19 @@ def test_a_camera_in_the_hand_sees_its_own_arm(camera_in_hand):
     estimate = solve(camera_in_hand)
     assert error_mm(estimate, camera_in_hand) < 5
     assert not estimate.diagnostics["background_known"]
+
+
+def test_a_fixed_camera_is_found_without_a_start(fixed_camera):
+    blind = replace(fixed_camera.without_truth(), initial_parent_T_camera=None)
+    estimate = GuessFree()(blind, rng=np.random.default_rng(0))
+    assert error_mm(estimate, fixed_camera) < 2
+    assert estimate.diagnostics["stage"] == "maskless"
+
+
+def test_without_a_start_one_photograph_is_refused(fixed_camera):
+    blind = replace(fixed_camera.subset([0]).without_truth(), initial_parent_T_camera=None)
+    with pytest.raises(Refusal, match="3 photographs or more"):
+        GuessFree()(blind, rng=np.random.default_rng(0))
 
 
 def test_the_same_photographs_give_the_same_answer(fixed_camera):
