@@ -6,6 +6,7 @@ modules with hooks. Every module is imported inside its own ``try``, so one bad 
 
 from __future__ import annotations
 
+import pkgutil
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
@@ -195,3 +196,10 @@ def _refuse_shared_names(plugins: list[Plugin]) -> list[Plugin]:
         return replace(plugin, status=PluginStatus.CONFLICT, detail=detail)
 
     return [checked(plugin) for plugin in plugins]
+
+
+def submodules(package_name: str, folder: str = "") -> tuple[str, ...]:
+    """Full names of the modules in a package (or in its sub-package `folder`); only the package is imported."""
+    package = import_module(f"{package_name}.{folder}" if folder else package_name)
+    found = pkgutil.iter_modules(package.__path__, prefix=f"{package.__name__}.")
+    return tuple(module.name for module in found if not module.ispkg)

@@ -1,6 +1,6 @@
 """Robots, grippers, cameras, the simulated controller and the virtual lab."""
 
-from hecbench.modules import submodules
+from hecbench.registry import submodules
 
 plugin_modules = (
     *submodules(__name__, "robots"),

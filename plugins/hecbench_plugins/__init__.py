@@ -1,6 +1,6 @@
 """Calibration methods and rulers, one per file."""
 
-from hecbench.modules import submodules
+from hecbench.registry import submodules
 
 plugin_modules = (
     *submodules(__name__, "solvers"),

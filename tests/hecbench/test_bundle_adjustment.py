@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from hecbench import se3
-from hecbench.bundle_adjustment import _step, adjust, adjust_with_noise
-from hecbench.bundle_model import Noise, Problem, State, linearise, predict, robot_corrections, start
+from hecbench.bundle.adjustment import _step, adjust, adjust_with_noise
+from hecbench.bundle.model import Noise, Problem, State, linearise, predict, robot_corrections, start
 from hecbench.diagnose.fit import IdealCamera
 from hecbench.errors import SolverFailure
 from hecbench.recording import Mounting

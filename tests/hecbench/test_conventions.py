@@ -5,8 +5,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from hecbench import se3
-from hecbench.conventions import prove, readings, stillness
 from hecbench.errors import InputError
+from hecbench.exchange.conventions import prove, readings, stillness
 from hecbench.recording import Mounting
 
 BOTH = tuple(Mounting)

@@ -13,7 +13,7 @@ from hecbench.recording import CameraModel, Mounting
 
 SCHEMA_KEYS = [
     "schema", "solver", "recording", "mounting", "parent_link", "camera", "status", "reason", "parent_T_camera",
-    "other_T_target", "covariance", "termination", "iterations", "renders", "seconds", "diagnostics", "extras",
+    "carrier_T_target", "covariance", "termination", "iterations", "renders", "seconds", "diagnostics", "extras",
     "errors", "held_out", "provenance",
 ]  # fmt: skip
 

@@ -11,9 +11,10 @@ import pytest
 import yaml
 from scipy.spatial.transform import Rotation
 
-from hecbench import export, registry, se3
+from hecbench import registry, se3
 from hecbench.errors import InputError
 from hecbench.estimate import Estimate, Status, Termination
+from hecbench.exchange import export
 from hecbench.recording import Mounting
 from hecbench.specs import ExporterSpec, Kind
 

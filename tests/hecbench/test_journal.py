@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from hecbench import journal
 from hecbench.errors import HecbenchError, InputError
+from hecbench.storage import journal
 
 
 def append(path, items, resume=True):

@@ -9,8 +9,8 @@ from PIL import Image
 from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.estimate import Estimate, Status
-from hecbench.overlay import Overlay, render
-from hecbench.recording_io import load
+from hecbench.report.overlay import Overlay, render
+from hecbench.storage.recording_io import load
 
 
 @pytest.fixture(scope="module")

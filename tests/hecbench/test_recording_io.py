@@ -13,10 +13,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from hecbench import recording_io
 from hecbench.conformance import rig
 from hecbench.errors import InputError
 from hecbench.recording import Mounting
+from hecbench.storage import recording_io
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ import pytest
 
 from hecbench import se3
 from hecbench.errors import InputError
-from hecbench.robot import load_robot
+from hecbench.robots.model import load_robot
 
 DENSO = "data/robots/denso_vs060/vs060_description/vs060.urdf"
 

@@ -3,8 +3,8 @@
 import numpy as np
 
 from hecbench import se3
-from hecbench.robot import load_robot
-from hecbench.robot_writer import write_urdf
+from hecbench.robots.model import load_robot
+from hecbench.robots.writer import write_urdf
 
 
 def test_reads_back_as_it_was(tmp_path, rng):

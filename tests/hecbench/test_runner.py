@@ -5,12 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hecbench import conformance, recording_io, registry, runner, se3, store
+from hecbench import conformance, preparation, registry, se3
 from hecbench.errors import InputError, Refusal, SolverFailure
 from hecbench.estimate import Estimate, Status
 from hecbench.recording import Mounting
-from hecbench.runner import Options, Task
+from hecbench.running import runner, solving
+from hecbench.running.runner import Options, Task
 from hecbench.specs import Kind, Need, SolverSpec
+from hecbench.storage import recording_io, store
 
 
 def spec(solver, needs=()):
@@ -31,21 +33,21 @@ def test_every_way_to_end_is_a_result(exact_rig):
         Status.FAILED: (SolverFailure("diverged"), "diverged"),
     }
     for status, (error, reason) in ends.items():
-        (estimate,) = runner.solve(exact_rig, [spec(raises(error))])
+        (estimate,) = solving.solve(exact_rig, [spec(raises(error))])
         assert (estimate.status, estimate.reason) == (status, reason)
-    (estimate,) = runner.solve(exact_rig, [spec(raises(ZeroDivisionError("x")))])
+    (estimate,) = solving.solve(exact_rig, [spec(raises(ZeroDivisionError("x")))])
     assert estimate.status is Status.FAILED
     assert "ZeroDivisionError: x (test_runner.py:" in estimate.reason
     with pytest.raises(InputError, match="damaged"):
-        runner.solve(exact_rig, [spec(raises(InputError("damaged")))])
-    (estimate,) = runner.solve(
+        solving.solve(exact_rig, [spec(raises(InputError("damaged")))])
+    (estimate,) = solving.solve(
         exact_rig, [spec(raises(InputError("damaged")))], Options(stop_on_bad_input=False)
     )
     assert estimate.status is Status.FAILED
 
 
 def test_unmet_needs_are_refused_with_the_key_to_give(exact_rig):
-    (estimate,) = runner.solve(exact_rig, [spec(None, {Need.MASKS, Need.JOINTS})])
+    (estimate,) = solving.solve(exact_rig, [spec(None, {Need.MASKS, Need.JOINTS})])
     assert estimate.status is Status.REFUSED
     assert estimate.reason == "the recording lacks masks (samples[].mask); joints (samples[].joints_rad)"
 
@@ -57,7 +59,7 @@ def test_solvers_see_neither_truth_nor_global_seed_and_are_labelled(exact_rig):
         seen.append((recording.truth_parent_T_camera, rng.integers(1000)))
         return Estimate(exact_rig.truth_parent_T_camera)
 
-    first, second = (runner.solve(exact_rig, [spec(solver)], Options(seed=4))[0] for _ in range(2))
+    first, second = (solving.solve(exact_rig, [spec(solver)], Options(seed=4))[0] for _ in range(2))
     assert seen[0] == seen[1]
     assert seen[0][0] is None
     assert first.errors["tre_mm"] < 1e-9
@@ -75,11 +77,11 @@ def test_start_and_truth_are_kept_of_every_run(exact_rig):
     """Also of one without an answer, so that a report can tell what starts failed."""
     start = exact_rig.truth_parent_T_camera @ se3.from_rotvec([0.1, 0, 0], [0.2, 0, 0])
     begun = replace(exact_rig, initial_parent_T_camera=start)
-    (estimate,) = runner.solve(begun, [spec(None, {Need.MASKS})])
+    (estimate,) = solving.solve(begun, [spec(None, {Need.MASKS})])
     assert estimate.status is Status.REFUSED
     np.testing.assert_allclose(estimate.provenance["initial_parent_T_camera"], start)
     np.testing.assert_allclose(estimate.provenance["truth_parent_T_camera"], exact_rig.truth_parent_T_camera)
-    (without,) = runner.solve(begun.without_truth(), [spec(None, {Need.MASKS})])
+    (without,) = solving.solve(begun.without_truth(), [spec(None, {Need.MASKS})])
     assert "truth_parent_T_camera" not in without.provenance
 
 
@@ -99,24 +101,24 @@ def test_an_unseen_target_is_a_reason_not_an_error(exact_rig):
     blank = np.full((960, 1280, 3), 128, np.uint8)
     images = (blank,) * len(exact_rig)
     unseen = replace(exact_rig, camera_T_target=None, corners_px=None, images=images)
-    (estimate,) = runner.solve(unseen, [spec(None, {Need.TARGET_POSES})])
+    (estimate,) = solving.solve(unseen, [spec(None, {Need.TARGET_POSES})])
     assert estimate.status is Status.REFUSED
     assert "no image shows the chessboard" in estimate.reason
 
 
 def test_held_out_is_measured_where_there_is_no_truth(exact_rig):
     park = registry.load().get(Kind.SOLVER, "park", SolverSpec)
-    (estimate,) = runner.solve(exact_rig.without_truth(), [park])
+    (estimate,) = solving.solve(exact_rig.without_truth(), [park])
     assert estimate.errors is None
     assert estimate.held_out["reprojection_px"] < 1e-6
     assert estimate.held_out["samples"] == len(exact_rig)
-    (without,) = runner.solve(exact_rig.without_truth(), [park], Options(held_out=False))
+    (without,) = solving.solve(exact_rig.without_truth(), [park], Options(held_out=False))
     assert without.held_out is None
 
 
 def test_joints_give_robot_poses(shared):
     recording = recording_io.load(shared / "data" / "ur3e_cam1")
-    computed = runner.with_robot_poses(replace(recording, base_T_flange=None))
+    computed = preparation.with_robot_poses(replace(recording, base_T_flange=None))
     np.testing.assert_allclose(computed.base_T_flange, recording.base_T_flange, atol=1e-6)
 
 
@@ -167,12 +169,12 @@ def test_resume_runs_a_changed_recording_again(tmp_path):
 
 def test_recordings_are_recognised_or_refused(tmp_path, exact_rig):
     recording_io.save(exact_rig, tmp_path / "native")
-    assert runner.load_recording(tmp_path / "native").name == "rig"
+    assert preparation.load_recording(tmp_path / "native").name == "rig"
     with pytest.raises(InputError, match="does not exist"):
-        runner.load_recording(tmp_path / "nowhere")
+        preparation.load_recording(tmp_path / "nowhere")
     (tmp_path / "empty").mkdir()
     with pytest.raises(InputError, match=r"no known recording. Known are .*native"):
-        runner.load_recording(tmp_path / "empty")
+        preparation.load_recording(tmp_path / "empty")
 
 
 def test_a_cluster_gives_the_same_results(tmp_path):

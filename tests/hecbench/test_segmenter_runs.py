@@ -7,13 +7,14 @@ import pytest
 from hecbench_datasets import synthetic
 from hecbench_plugins.evaluators.mask_iou import of_masks
 
-from hecbench import planning, registry, runner
+from hecbench import registry
 from hecbench.conformance import rig
 from hecbench.errors import InputError
 from hecbench.estimate import Estimate, Status
 from hecbench.recording import Mounting
 from hecbench.report.tables import groups
-from hecbench.runner import Options
+from hecbench.running import planning, runner, solving
+from hecbench.running.solving import Options
 from hecbench.specs import Kind, SolverSpec
 
 
@@ -27,7 +28,7 @@ def scene():
 
 
 def test_the_estimate_names_the_segmenter_and_tells_the_overlaps(scene):
-    (found,) = runner.solve(scene, [spec("render_gn")], Options(segmenter="given"))
+    (found,) = solving.solve(scene, [spec("render_gn")], Options(segmenter="given"))
     assert found.provenance["masks"] == "given"
     assert found.diagnostics["masks_iou_given"] == 1
     assert found.diagnostics["mask_iou"] > 0.97
@@ -42,7 +43,7 @@ def test_a_bad_mask_overlaps_less_with_the_truth(scene):
 
 def test_left_out_views_are_predicted_where_there_is_no_target():
     views = synthetic.make("views_3", 0, 4)
-    (found,) = runner.solve(views, [spec("render_gn")], Options(held_out=True))
+    (found,) = solving.solve(views, [spec("render_gn")], Options(held_out=True))
     held_out = found.held_out
     assert (held_out["folds"], held_out["failed_folds"], held_out["samples"]) == (3, 0, 3)
     assert held_out["mask_iou"] > 0.97
@@ -52,11 +53,11 @@ def test_left_out_views_are_predicted_where_there_is_no_target():
 
 def test_without_masks_robot_methods_are_refused_and_marker_methods_run(scene):
     bare = replace(scene, masks=None)
-    (refused,) = runner.solve(bare, [spec("render_gn")], Options(segmenter="given"))
+    (refused,) = solving.solve(bare, [spec("render_gn")], Options(segmenter="given"))
     assert refused.status is Status.REFUSED
     assert "segmenter 'given'" in refused.reason
     markers = rig(np.random.default_rng(3), Mounting.EYE_TO_HAND)
-    (solved,) = runner.solve(markers, [spec("park")], Options(segmenter="given"))
+    (solved,) = solving.solve(markers, [spec("park")], Options(segmenter="given"))
     assert solved.status is Status.OK
 
 

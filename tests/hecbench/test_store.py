@@ -5,9 +5,9 @@ import multiprocessing
 import numpy as np
 import pytest
 
-from hecbench import store
 from hecbench.errors import HecbenchError, InputError
 from hecbench.estimate import Estimate
+from hecbench.storage import store
 
 
 def estimates(count):

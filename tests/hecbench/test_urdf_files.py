@@ -5,10 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hecbench import planning, recording_io, urdf_files
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
-from hecbench.robot import load_robot
+from hecbench.robots import urdf_files
+from hecbench.robots.model import load_robot
+from hecbench.running import planning
+from hecbench.storage import recording_io
 
 OBJ = """mtllib {mtl}
 usemtl paint

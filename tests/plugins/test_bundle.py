@@ -5,14 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hecbench_datasets.synthetic_markers import PRESETS, generate, make
-from hecbench_plugins.reprojection import corner_problem, opencv_camera
+from hecbench_plugins.markers.reprojection import corner_problem, opencv_camera
 from hecbench_plugins.solvers.bundle import Bundle, IntrinsicsPrior
 from hecbench_plugins.solvers.bundle_fixed import bundle_fixed
 
-from hecbench import recording_io, se3
+from hecbench import se3
 from hecbench.conformance import rig
 from hecbench.errors import Refusal, SolverFailure
 from hecbench.recording import DISTORTION_LENGTHS, Mounting
+from hecbench.storage import recording_io
 from hecbench.targets import ChessboardTarget
 
 KNOWN = {"tag_2m": Bundle(0.3, 0.05, 0.5), "tag_2m_in_hand": Bundle(0.3, 0.05, 0.5)}

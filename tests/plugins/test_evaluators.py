@@ -7,8 +7,9 @@ import pytest
 from hecbench_plugins.evaluators.held_out import held_out, refit_target
 from hecbench_plugins.evaluators.truth import errors
 
-from hecbench import recording_io, runner, se3
+from hecbench import preparation, se3
 from hecbench.estimate import Estimate, Status
+from hecbench.storage import recording_io
 
 
 def truth(recording):
@@ -115,5 +116,5 @@ def test_refit_uses_pixels_where_there_are_pixels(exact_rig, rng):
 
 def test_real_recording(shared):
     recording = recording_io.load(shared / "data" / "ur3e_cam1")
-    found = predict(runner.prepare(recording).without_truth(), truth(recording))
+    found = predict(preparation.prepare(recording).without_truth(), truth(recording))
     assert found["reprojection_px"] == pytest.approx(0.65, abs=0.1)

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 import trimesh
 from hecbench_datasets import guess_free as suite
-from hecbench_plugins.guess_free import GuessFree, ViewSphere, best_apart, look_at
+from hecbench_plugins.solvers.render_gn_free import render_gn_free
+from hecbench_plugins.start_search.view_sphere import ViewSphere, best_apart, look_at
 
 from hecbench import se3
 from hecbench.errors import Refusal, SolverFailure
 from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
 from hecbench.rendering import Renderer, RenderMesh
-from hecbench.robot import load_robot
+from hecbench.robots.model import load_robot
 
 BOX_URDF = """<robot name="box">
   <link name="base"><visual><geometry><mesh filename="foot.obj"/></geometry></visual></link>
@@ -23,7 +24,7 @@ BOX_URDF = """<robot name="box">
 
 
 def solve(recording):
-    return GuessFree()(recording.without_truth(), rng=np.random.default_rng(0))
+    return render_gn_free()(recording.without_truth(), rng=np.random.default_rng(0))
 
 
 def test_the_sphere_is_covered_as_densely_as_asked():

@@ -7,10 +7,11 @@ import pytest
 from hecbench_datasets import synthetic
 from hecbench_plugins.evaluators import keypoints
 
-from hecbench import diagnose, registry, runner, se3
+from hecbench import diagnose, registry, se3
 from hecbench.estimate import Estimate, Status
 from hecbench.recording import CameraModel, Mounting, Recording
 from hecbench.report.tables import Group, table
+from hecbench.running import solving
 from hecbench.specs import Kind, SolverSpec
 from hecbench.targets import PointsTarget
 
@@ -99,9 +100,9 @@ def test_marker_methods_refuse_a_keypoint(labelled):
     """One point has no pose: every method that lives on a target says so, and the check does not trip over it."""
     names = ("park", "shah", "bundle", "single3d_iterative", "tsai")
     specs = [registry.load().get(Kind.SOLVER, name, SolverSpec) for name in names]
-    for estimate in runner.solve(labelled, specs):
+    for estimate in solving.solve(labelled, specs):
         assert estimate.status is Status.REFUSED, estimate.reason
-    assert not [f for f in diagnose.check(labelled, runner.prepare) if f.severity == "critical"]
+    assert not [f for f in diagnose.check(labelled) if f.severity == "critical"]
 
 
 def test_the_runner_applies_them(labelled):
@@ -110,7 +111,7 @@ def test_the_runner_applies_them(labelled):
             return Estimate(labelled.truth_parent_T_camera)
 
     spec = SolverSpec(name="told", summary="s", factory=Told, needs=frozenset(), reference="r")
-    (estimate,) = runner.solve(labelled, [spec])
+    (estimate,) = solving.solve(labelled, [spec])
     assert estimate.diagnostics["pck_20_px"] == 1.0
     assert estimate.errors["add_mm"] < 1e-9
     assert "links_add_mm" not in estimate.errors

@@ -5,18 +5,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hecbench_datasets import synthetic
-from hecbench_plugins.render_gn import RenderGN
-from hecbench_plugins.render_views import prepare
+from hecbench_plugins.solvers.render_gn import render_gn
+from hecbench_plugins.views.pyramid import prepare
 
 from hecbench import se3
 from hecbench.errors import Refusal, SolverFailure
 from hecbench.estimate import Termination
 from hecbench.recording import CameraModel, Mounting, RobotDescription
-from hecbench.recording_io import load
+from hecbench.storage.recording_io import load
 
 
 def solve(recording):
-    return RenderGN()(recording.without_truth(), rng=np.random.default_rng(0))
+    return render_gn()(recording.without_truth(), rng=np.random.default_rng(0))
 
 
 def camera_T_parent_error_mm(estimate, recording):
@@ -173,7 +173,7 @@ def test_same_bytes_from_the_same_input(easy):
 
 def test_a_furnished_scene_is_not_taken_for_hiding():
     """A bar before a plain wall may hide the robot; more furniture than robot only surrounds it."""
-    from hecbench_plugins.render_views import hidden_by_others
+    from hecbench_plugins.views.pyramid import hidden_by_others
 
     image, mask = np.zeros((120, 160, 3), np.float32), np.zeros((120, 160), np.float32)
     mask[40:80, 60:100] = 1

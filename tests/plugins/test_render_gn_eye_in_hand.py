@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from hecbench_plugins.render_gn import RenderGN
+from hecbench_plugins.solvers.render_gn import render_gn
 
 from hecbench import se3
 from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
 from hecbench.rendering import Renderer, RenderMesh
-from hecbench.robot import load_robot
-from hecbench.robot_writer import write_urdf
+from hecbench.robots.model import load_robot
+from hecbench.robots.writer import write_urdf
 
 CAMERA = CameraModel(640, 480, np.array([[500.0, 0, 319.5], [0, 500, 239.5], [0, 0, 1]]))
 BASE_T_OTHER = se3.exp([0, 0, np.pi, 0, 0, 0])
@@ -48,7 +48,7 @@ def recording(model, name, flange_T_camera, joints_rad, off, robot):
 
 
 def solve(given):
-    estimate = RenderGN()(given.without_truth(), rng=np.random.default_rng(0))
+    estimate = render_gn()(given.without_truth(), rng=np.random.default_rng(0))
     ends = estimate.parent_T_camera, given.truth_parent_T_camera
     assert estimate.diagnostics["overlap"] > 0.97
     return se3.translation_error_m(*ends), se3.rotation_error_rad(*ends)

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hecbench_datasets import synthetic
-from hecbench_plugins.render_gn import RenderGN
-from hecbench_plugins.render_unknowns import PRIOR, Unknown
+from hecbench_plugins.second_order.unknowns import PRIOR, Unknown
+from hecbench_plugins.solvers.render_gn import render_gn
 
 from hecbench import registry, se3
 from hecbench.recording import CameraModel
@@ -14,7 +14,7 @@ from hecbench.specs import Kind, SolverSpec
 
 
 def solve(recording, *unknown):
-    solver = RenderGN(unknown=unknown)
+    solver = render_gn(unknown=unknown)
     return solver(recording.without_truth(), rng=np.random.default_rng(0))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hecbench_plugins.scene_background import SAME_COLOUR, background, foreground
+from hecbench_plugins.views.scene_background import SAME_COLOUR, background, foreground
 
 from hecbench.errors import InputError
 

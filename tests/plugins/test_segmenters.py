@@ -8,12 +8,12 @@ from hecbench_datasets import synthetic
 from hecbench_plugins.segmenters.background import by_background
 from hecbench_plugins.segmenters.given import given
 from hecbench_plugins.segmenters.grabcut import GrabCut
-from hecbench_plugins.silhouettes import Silhouettes
+from hecbench_plugins.views.silhouettes import Silhouettes
 
 from hecbench import se3
 from hecbench.errors import Refusal
 from hecbench.recording import CameraModel, Mounting
-from hecbench.recording_io import load
+from hecbench.storage.recording_io import load
 
 
 def iou(a, b):

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hecbench_plugins import single3d
+from hecbench_plugins.markers import single3d
 from hecbench_plugins.solvers.single3d_closed import Single3DClosed
 from hecbench_plugins.solvers.single3d_iterative import single3d_iterative
 from scipy.optimize import least_squares

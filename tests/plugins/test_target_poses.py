@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hecbench_datasets.synthetic_markers import PRESETS, generate
-from hecbench_plugins.target_poses import planar_candidates, project, target_poses
+from hecbench_plugins.markers.target_poses import planar_candidates, project, target_poses
 
 from hecbench import se3
 from hecbench.errors import Refusal

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from hecbench_plugins import dual_quaternions
-from hecbench_plugins.hand_eye import pose_pairs
+from hecbench_plugins.markers import dual_quaternions
+from hecbench_plugins.markers.hand_eye import pose_pairs
 from hecbench_plugins.solvers.wang2024_reconstructed import Method, Wang2024
 
 from hecbench import se3
