@@ -1,7 +1,7 @@
 """Discovery of plugins. Broken, conflicting and not-ready plugins are data to be listed, never crashes.
 
-An entry point of group ``hecbench`` names a module with hooks, or a package whose ``plugin_modules`` lists
-modules with hooks. Every module is imported inside its own ``try``, so one bad file costs one plugin.
+An entry point of group ``hecbench`` names a module with hooks, or a package whose ``plugin_folders`` names folders of
+such modules. Every module is imported inside its own ``try``, so one bad file costs one plugin.
 """
 
 from __future__ import annotations
@@ -147,7 +147,7 @@ def _plugins_of(entry_point: metadata.EntryPoint, observers: dict[str, TrialObse
     except Exception as error:  # a stranger's module may raise anything at import
         yield broken(entry_point.name, error)
         return
-    for module_name in getattr(target, "plugin_modules", (target.__name__,)):
+    for module_name in _module_names(target):
         try:
             specs, observer = _implemented(import_module(module_name))
         except Exception as error:  # likewise
@@ -158,6 +158,18 @@ def _plugins_of(entry_point: metadata.EntryPoint, observers: dict[str, TrialObse
         for spec in specs:
             status, detail = _readiness(spec)
             yield Plugin(spec.name, spec.kind, status, distribution, version, detail, spec)
+
+
+def _module_names(target: ModuleType) -> Iterator[str]:
+    """The modules with hooks: those of `plugin_folders` ("." is the package itself), or the target alone."""
+    folders = getattr(target, "plugin_folders", None)
+    if folders is None:
+        yield target.__name__
+        return
+    for folder in folders:
+        package = target if folder == "." else import_module(f"{target.__name__}.{folder}")
+        found = pkgutil.iter_modules(package.__path__, prefix=f"{package.__name__}.")
+        yield from (module.name for module in found if not module.ispkg)
 
 
 def _implemented(module: ModuleType) -> tuple[list[AnySpec], TrialObserver | None]:
@@ -196,10 +208,3 @@ def _refuse_shared_names(plugins: list[Plugin]) -> list[Plugin]:
         return replace(plugin, status=PluginStatus.CONFLICT, detail=detail)
 
     return [checked(plugin) for plugin in plugins]
-
-
-def submodules(package_name: str, folder: str = "") -> tuple[str, ...]:
-    """Full names of the modules in a package (or in its sub-package `folder`); only the package is imported."""
-    package = import_module(f"{package_name}.{folder}" if folder else package_name)
-    found = pkgutil.iter_modules(package.__path__, prefix=f"{package.__name__}.")
-    return tuple(module.name for module in found if not module.ispkg)

@@ -44,6 +44,13 @@ def test_file_round_trip(tmp_path, rng):
     json.loads((tmp_path / "deep" / "park.json").read_text())
 
 
+def test_files_of_version_0_1_are_read():
+    written = Estimate(np.eye(4), carrier_T_target=se3.exp(np.arange(6) / 10)).to_json()
+    written["other_T_target"] = written.pop("carrier_T_target")
+    read = module.decode(json.dumps(written).encode(), "old.json")
+    np.testing.assert_allclose(read.carrier_T_target, se3.exp(np.arange(6) / 10))
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

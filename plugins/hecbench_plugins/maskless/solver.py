@@ -166,8 +166,8 @@ class Maskless:
             raise SolverFailure(
                 f"the photographs confirm {100 * found.confirmed_share:.0f} % of the contour where the best of"
                 f" {photographs.descents} descents ended, {100 * self.least_confirmed_share:.0f} % are needed: the"
-                f" camera is farther off than {found.place}, the joints or the robot are not those of the photographs, the"
-                " camera or the scene moved, or too little of the robot is seen; give more views or masks"
+                f" camera is farther off than {found.place}, the joints or the robot are not those of the photographs,"
+                " the camera or the scene moved, or too little of the robot is seen; give more views or masks"
             )
         return self._finish(photographs, found)
 

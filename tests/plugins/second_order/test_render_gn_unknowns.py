@@ -51,4 +51,4 @@ def test_scale_of_the_robot_is_said_to_be_unobservable():
 @pytest.mark.parametrize("unknown", list(Unknown))
 def test_every_unknown_can_be_asked_for_by_name(unknown):
     solver = registry.load().get(Kind.SOLVER, f"render_gn[unknown={unknown}]", SolverSpec).factory()
-    assert solver.unknown == (unknown,)
+    assert solver.by_masks.unknown == solver.by_photographs.unknown == (unknown,)
