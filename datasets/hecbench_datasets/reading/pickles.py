@@ -11,7 +11,7 @@ import pickle
 import re
 from collections import OrderedDict
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -57,7 +57,7 @@ class _Numbers:
         _, shape, kind, fortran, content = state
         self.value = _view(content, kind, shape, "F" if fortran else "C").value
 
-    def __array__(self, dtype: DTypeLike = None, copy: bool | None = None) -> NDArray[Any]:
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
         return np.asarray(self.value, dtype)
 
 
@@ -73,7 +73,7 @@ class _Plain(pickle._Unpickler):
     The unpickler written in Python: the memory of the other one grows with an index that the file names.
     """
 
-    dispatch: ClassVar = {
+    dispatch: ClassVar[dict[int, Any]] = {
         code: load for code, load in pickle._Unpickler.dispatch.items() if code not in _REFUSED
     }
     dispatch[pickle.BYTEARRAY8[0]] = dispatch[
