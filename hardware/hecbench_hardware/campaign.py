@@ -138,6 +138,7 @@ def _freedrive(trial: _Trial, robot: UrRobot) -> None:
 def _grip(trial: _Trial, robot: UrRobot) -> None:
     gripper = RobotiqGripper(robot.host, timeout_s=_GRIPPER_S)
     try:
+        gripper.enable()
         for _ in range(3):
             gripper.open_fingers()
             gripper.close_fingers()

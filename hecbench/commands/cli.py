@@ -318,11 +318,13 @@ def check(recording: Path, as_json: bool) -> None:
 @click.option("--out", type=_folder, help="Folder of the pictures; default: out/render/<recording>.")
 def render(recording: Path, answer: Path, out: Path | None) -> None:
     """Draw the robot over the images of a RECORDING where an estimate places it."""
-    from hecbench import estimate, preparation
+    from hecbench import estimate, files, preparation
     from hecbench.report import overlay
 
     loaded = preparation.load_recording(recording)
-    written = overlay.render(loaded, estimate.load(answer), out or Path("out/render") / loaded.name)
+    written = overlay.render(
+        loaded, estimate.load(answer), out or Path("out/render") / files.safe_name(loaded.name)
+    )
     click.echo(f"{written[0].parent}: {len(written)} pictures")
 
 

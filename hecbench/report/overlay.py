@@ -69,7 +69,7 @@ def render(recording: Recording, estimate: Estimate, folder: Path) -> list[Path]
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     for sample in overlay.samples:
-        path = folder / f"{recording.sample_ids[sample]}.png"
+        path = folder / f"{files.safe_name(recording.sample_ids[sample])}.png"
         _save([overlay.draw(sample, estimate.parent_T_camera)], path)
         written.append(path)
     if steps := estimate.diagnostics.get("path"):

@@ -9,10 +9,13 @@ from hecbench import files
 from hecbench.errors import InputError
 
 _PACKAGE = "package://"
+_MESHES = (".stl", ".obj", ".dae", ".ply", ".glb", ".gltf")
 
 
 def find_mesh(filename: str, urdf: Path) -> Path:
     """The mesh file: relative to the URDF's folder or one above it, with or without a package's name."""
+    if not filename.lower().endswith(_MESHES):
+        raise InputError(f"{urdf}: mesh '{filename}' is no mesh file; use one of {' '.join(_MESHES)}")
     relative = Path(filename.removeprefix(_PACKAGE).removeprefix("file://"))
     tails = [Path(*relative.parts[skip:]) for skip in range(len(relative.parts))]
     places = (urdf.parent, *urdf.parent.absolute().parents[:2])
@@ -50,9 +53,11 @@ def copy(urdf: Path, folder: Path) -> Path:
 
 
 def _materials(mesh: Path) -> list[Path]:
-    """The material files beside an OBJ file that it names."""
+    """The material files that an OBJ file names and that lie beside it; others are left where they are."""
     if mesh.suffix.lower() != ".obj":
         return []
     lines = files.read_bytes(mesh).decode("utf-8", "replace").splitlines()
     named = {word for line in lines if line.startswith("mtllib ") for word in line.split()[1:]}
-    return sorted(mesh.parent / name for name in named if (mesh.parent / name).is_file())
+    folders = mesh.parent.resolve(), mesh.resolve().parent
+    found = (mesh.parent / name for name in named)
+    return sorted(path for path in found if path.is_file() and path.resolve().parent in folders)

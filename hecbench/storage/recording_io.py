@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import zipfile
+from itertools import count
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -326,14 +327,35 @@ def _store_pictures(
 ) -> list[str | None]:
     if sources is None:
         return [None] * len(ids)
+    stored = {
+        source: source.resolve().relative_to(folder.resolve()).as_posix()
+        for source in sources
+        if isinstance(source, Path) and source.resolve().is_relative_to(folder.resolve())
+    }
+    taken = {name.casefold() for name in stored.values()}
     names: list[str | None] = []
     for sample_id, source in zip(ids, sources, strict=True):
-        if isinstance(source, np.ndarray):
-            names.append(f"{kind}/{sample_id}.png")
-            files.write_bytes(folder / kind / f"{sample_id}.png", encode_png(source))
+        if source is None:
+            names.append(None)
+        elif isinstance(source, np.ndarray):
+            name = _free_name(kind, f"{files.safe_name(sample_id)}.png", taken)
+            files.write_bytes(folder / name, encode_png(source))
+            names.append(name)
         else:
-            names.append(None if source is None else _copied(source, folder, kind))
+            if source not in stored:
+                stored[source] = _free_name(kind, files.safe_name(source.name), taken)
+                files.write_bytes(folder / stored[source], files.read_bytes(source))
+            names.append(stored[source])
     return names
+
+
+def _free_name(kind: str, name: str, taken: set[str]) -> str:
+    """A name below `kind` that no other picture has, on file systems that ignore case too."""
+    stem, suffix = Path(name).stem, Path(name).suffix
+    tries = (f"{kind}/{stem}{'' if i == 1 else f'_{i}'}{suffix}" for i in count(1))
+    free = next(path for path in tries if path.casefold() not in taken)
+    taken.add(free.casefold())
+    return free
 
 
 def encode_png(picture: NDArray[np.uint8]) -> bytes:
@@ -350,11 +372,3 @@ def _copied_robot(urdf: Path, folder: Path) -> str:
     if not urdf.resolve().is_relative_to(folder.resolve()):
         urdf = urdf_files.copy(urdf, folder / "robot")
     return urdf.resolve().relative_to(folder.resolve()).as_posix()
-
-
-def _copied(source: Path, folder: Path, kind: str) -> str:
-    """The path of a file relative to the folder, copied in when it lies outside."""
-    if source.resolve().is_relative_to(folder.resolve()):
-        return source.resolve().relative_to(folder.resolve()).as_posix()
-    files.write_bytes(folder / kind / source.name, files.read_bytes(source))
-    return f"{kind}/{source.name}"

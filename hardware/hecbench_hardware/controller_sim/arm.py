@@ -152,6 +152,7 @@ class SimulatedArm:
 
     def move_joints(self, target: ArrayLike, speed: float, acceleration: float) -> Motion:
         """Straight in joint space, rad/s and rad/s^2 of the leading joint."""
+        self.note("motion: joints")
         start, end = self.joints.copy(), np.array(target, float)
         if np.abs(end).max() > self.arm.joint_range_rad:
             self.protective_stop("target outside the joint range")
@@ -163,6 +164,7 @@ class SimulatedArm:
 
     def move_linear(self, base_T_target: Array, speed: float, acceleration: float) -> Motion:
         """Straight in space, m/s and m/s^2, rotation at the same pace."""
+        self.note("motion: line")
         start = self.base_T_tcp
         turn = se3.so3_log(base_T_target[:3, :3] @ start[:3, :3].T)
         shift = base_T_target[:3, 3] - start[:3, 3]

@@ -29,6 +29,8 @@ class Dashboard:
     program: ProgramRunner
     version: tuple[int, int, int, int]
     remote: bool = True
+    marked: bool = True
+    """Whether the version says that no metal moves; without the mark it is taken for a real controller."""
 
     def answer(self, line: str) -> str:
         """The controller's answer to one command."""
@@ -36,7 +38,8 @@ class Dashboard:
         arm, program = self.program.arm, self.program
         if command == "polyscopeversion":
             major, minor, bugfix, build = self.version
-            return f"URSoftware {major}.{minor}.{bugfix}.{1_090_000 + build} {SIMULATED}"
+            mark = f" {SIMULATED}" if self.marked else ""
+            return f"URSoftware {major}.{minor}.{bugfix}.{1_090_000 + build}{mark}"
         if command == "get robot model":
             return arm.arm.name.upper().rstrip("E")
         if command == "is in remote control":
@@ -59,6 +62,7 @@ class Dashboard:
 
     def _act(self, command: str) -> str:
         arm, program = self.program.arm, self.program
+        arm.note(f"dashboard: {command}")
         if command == "stop":
             program.kill()
             return "Stopped"

@@ -49,6 +49,7 @@ class Faults:
             "gripper_jam": lambda _: setattr(self.gripper, "jammed", True),
             "gripper_silent": lambda _: setattr(self.gripper, "silent", True),
             "gripper_object": lambda x: setattr(self.gripper, "object_at", int(x[0])),
+            "unmarked": lambda _: setattr(self.dashboard, "marked", False),
             "reset": lambda _: self._reset(),
         }
 
@@ -70,6 +71,7 @@ class Faults:
             return str(np.abs(arm.joint_speeds).max())
         if name not in self._verbs:
             return f"unknown fault '{name}': choose one of {', '.join(self._verbs)}, log, speed"
+        arm.note(f"injected: {line.strip()}")
         try:
             self._verbs[name]([float(word) for word in words])
         except (ValueError, IndexError):
@@ -92,7 +94,8 @@ class Faults:
         vars(arm).update(vars(fresh))
         arm.joints = np.array(HOME_RAD)
         vars(self.gripper).update(vars(RobotiqSocket()))
-        self.dashboard.remote, self.stream_frozen, self.link_back_s = True, False, 0.0
+        self.dashboard.remote = self.dashboard.marked = True
+        self.stream_frozen, self.link_back_s = False, 0.0
 
 
 def _six(joints_rad: list[float]) -> Array:

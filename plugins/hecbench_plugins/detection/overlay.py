@@ -54,7 +54,7 @@ def write_overlays(recording: Recording, folder: Path) -> list[Path]:
     written = []
     for i, sample_id in enumerate(recording.sample_ids):
         if recording.images is not None and recording.images[i] is not None:
-            path = folder / f"{sample_id}.png"
+            path = folder / f"{files.safe_name(sample_id)}.png"
             files.write_bytes(path, encode_png(overlay(recording, i)))
             written.append(path)
     return written
