@@ -11,8 +11,8 @@ import rtde_control
 import rtde_io
 import rtde_receive
 from hecbench_hardware.controller_sim.arm import SimulatedArm
-from hecbench_hardware.controller_sim.process import SimulatedController
 from hecbench_hardware.controller_sim.control_script import DONE
+from hecbench_hardware.controller_sim.process import SimulatedController
 from hecbench_hardware.controller_sim.program import ProgramRunner
 from hecbench_hardware.controller_sim.server import serve
 from hecbench_hardware.controller_sim.urscript.uploads import start_program

@@ -108,8 +108,15 @@ class _Server:
             now = time.monotonic()
             if now >= due:
                 due = now + CYCLE_S if now - due > _LATE_CYCLES * CYCLE_S else due + CYCLE_S
-                self.program.step()
+                self.advance()
                 self.stream(now)
+
+    def advance(self) -> None:
+        try:
+            self.program.step()
+        except Exception as error:  # a fault of the simulation: it costs the program, and is on record
+            self.program.refuse(f"the simulation failed: {type(error).__name__}: {error}")
+            self.program.kill()
 
     def close(self) -> None:
         for key in list(self.selector.get_map().values()):
@@ -187,8 +194,15 @@ class _Server:
         if not data:
             self.drop(connection)
             return
+        self.send(connection, self.said(connection, partial(connection.channel.receive, data)))
+        if self.faults.link_is_down:
+            for other in [c for c in self.connections.values() if c.port != FAULT_PORT]:
+                self.drop(other)
+
+    def said(self, connection: _Connection, say: Callable[[], bytes]) -> bytes:
+        """What a channel has to say; its end or its fault ends its connection."""
         try:
-            self.send(connection, connection.channel.receive(data))
+            return say()
         except Finished as end:
             self.send(connection, end.last)
             self.drop(connection)
@@ -196,16 +210,16 @@ class _Server:
             self.drop(connection, str(error))
         except Exception as error:  # a fault of the simulation: it costs this connection, and is on record
             self.drop(connection, f"{type(error).__name__}: {error}")
-        if self.faults.link_is_down:
-            for other in [c for c in self.connections.values() if c.port != FAULT_PORT]:
-                self.drop(other)
+        return b""
 
     def stream(self, now: float) -> None:
         if self.faults.stream_frozen:
             return
         for connection in list(self.connections.values()):
-            if len(connection.outbox) < _SLOW_READER_BYTES and (data := connection.channel.stream(now)):
-                self.send(connection, data)
+            if len(connection.outbox) < _SLOW_READER_BYTES:
+                data = self.said(connection, partial(connection.channel.stream, now))
+                if data:
+                    self.send(connection, data)
 
 
 def serve(

@@ -13,7 +13,7 @@ from hecbench_hardware.controller_sim.urscript.library import LIBRARY
 from hecbench_hardware.controller_sim.urscript.machine import STRUCT, Machine
 from hecbench_hardware.controller_sim.urscript.parser import parse
 from hecbench_hardware.controller_sim.urscript.sockets import Sockets
-from hecbench_hardware.controller_sim.urscript.syntax import Function
+from hecbench_hardware.controller_sim.urscript.syntax import Call, Do, Function
 from hecbench_hardware.controller_sim.urscript.tokens import OPENERS
 
 _WORDS = re.compile(r'"[^"\n]*"|#.*|[^\W\d]\w*')
@@ -27,14 +27,18 @@ class Uploads:
         self._rest = b""
         self._block: list[str] = []
         self._depth = 0
-        self.pending_bytes = 0
+        self._block_bytes = 0
+
+    @property
+    def pending_bytes(self) -> int:
+        """What waits for its end."""
+        return len(self._rest) + self._block_bytes
 
     def receive(self, data: bytes) -> None:
         """Take a piece of text."""
         lines, self._rest = complete_lines(self._rest + data)
         for line in lines:
             self._add(line)
-        self.pending_bytes = len(self._rest) + sum(len(line) for line in self._block)
 
     def unfinished(self) -> str:
         """The beginning of what has no end yet."""
@@ -46,8 +50,10 @@ class Uploads:
         words = [word for word in _WORDS.findall(line) if word[0] not in '"#']
         self._depth += sum((word in OPENERS) - (word == "end") for word in words)
         self._block.append(line)
+        self._block_bytes += len(line) + 1
         if self._depth <= 0:
-            text, self._block, self._depth = "\n".join(self._block), [], 0
+            text = "\n".join(self._block)
+            self._block, self._block_bytes, self._depth = [], 0, 0
             start_program(self._runner, text)
 
 
@@ -73,6 +79,8 @@ def compiled(runner: ProgramRunner, text: str) -> tuple[Program, str, bool]:
     check_calls(body, {*LIBRARY, STRUCT})
     name, is_secondary = "<unnamed>", False
     if len(body) == 1 and isinstance(body[0], Function):
-        name, is_secondary, body = body[0].name, body[0].word == "sec", body[0].body
+        main = body[0]
+        name, is_secondary = main.name, main.word == "sec"
+        body = [main, Do(main.line, Call(main.line, name, [], {}))]
     machine = Machine(runner, Sockets(runner.gripper, runner.host), LIBRARY)
     return machine.run(body), name, is_secondary

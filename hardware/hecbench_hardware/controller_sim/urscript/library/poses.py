@@ -24,7 +24,7 @@ def pose_inv(_: Machine, p_from: Value) -> Pose:
 
 
 def pose_add(_: Machine, p_1: Value, p_2: Value) -> Pose:
-    """Positions added, rotations multiplied: p_1 = base, p_2's rotation applied in the base frame."""
+    """Positions added, rotations multiplied."""
     a, b = pose(p_1, "p_1"), pose(p_2, "p_2")
     return Pose.of(se3.make(a[:3, :3] @ b[:3, :3], a[:3, 3] + b[:3, 3]))
 

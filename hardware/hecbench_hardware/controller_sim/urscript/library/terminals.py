@@ -101,8 +101,14 @@ def _analog(name: str, kind: str, first: int) -> Builtin:
     return Builtin(name, read, (("n", Builtin.REQUIRED),))
 
 
+def _int32(value: Value) -> int:
+    if not -(1 << 31) <= number(value, "value") < 1 << 31:
+        raise ScriptError(f"an integer register holds 32 bits, not {value}")
+    return int(value)
+
+
 _REGISTERS: Final[dict[str, tuple[str, int, Callable[[Value], Any]]]] = {
-    "integer": ("ints", REGISTERS, lambda value: int(number(value, "value"))),
+    "integer": ("ints", REGISTERS, _int32),
     "float": ("doubles", REGISTERS, lambda value: number(value, "value")),
     "boolean": ("bits", BITS, lambda value: truth(value, "value")),
 }
