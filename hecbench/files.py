@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
+import re
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -50,14 +52,29 @@ def write_text(path: Path, content: str) -> None:
 
 
 def read_bytes(path: Path) -> bytes:
-    """Read a file.
+    """Read a regular file; a pipe or device, which may never end, is refused.
 
     Raises:
-        InputError: it is missing or unreadable.
+        InputError: it is missing, unreadable or no regular file.
     """
     try:
+        if path.exists() and not path.is_file():
+            raise InputError(f"{path}: cannot be read (it is no regular file); give a file")
         return path.read_bytes()
     except FileNotFoundError:
         raise InputError(f"{path}: does not exist; check the path") from None
     except OSError as error:
         raise InputError(f"{path}: cannot be read ({error.strerror}); check its permissions") from error
+
+
+_LONGEST_NAME = 100
+"""Characters; file systems allow 255 bytes, and a suffix or a counter may follow."""
+
+
+def safe_name(text: str) -> str:
+    """A file name, without a folder, for a name that data chose; different names stay different.
+
+    Letters, digits and ``_ . -`` stay; what is replaced or cut is stood for by a digest.
+    """
+    name = re.sub(r"[^\w.-]", "_", text)[:_LONGEST_NAME].lstrip(".")
+    return name if name == text else f"{name}-{hashlib.sha256(text.encode()).hexdigest()[:8]}"

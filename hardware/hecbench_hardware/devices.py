@@ -161,9 +161,17 @@ class GripperStatus:
 
 
 class Gripper(Protocol):
-    """Two fingers. Commands return when the fingers stand and raise `DeviceFault` when they do not."""
+    """Two fingers. Commands return when the fingers stand and raise `DeviceFault` when they do not.
+
+    Opening the device only connects: before `enable` nothing is sent that could move fingers, and every command that
+    would is refused with an `InputError`.
+    """
 
     name: str
+
+    def enable(self) -> None:
+        """Make it ready, which may move the fingers. Only `arming.take_control` calls this, after the arm's."""
+        ...
 
     def open_fingers(self, width_m: float | None = None) -> None:
         """Open fully, or to a width."""
@@ -178,7 +186,7 @@ class Gripper(Protocol):
         ...
 
     def stop(self) -> None:
-        """Hold the fingers where they are."""
+        """Hold the fingers where they are; nothing before `enable`."""
         ...
 
     def close(self) -> None:

@@ -1,7 +1,6 @@
 """The pose of an object from its AprilTag: detection, both planar solutions, refinement, covariance, refusals.
 
-Detection: pupil-apriltags (Wang and Olson 2016, "AprilTag 2: efficient and robust fiducial detection"), whose
-pixel centres lie at half integers; ours and OpenCV's lie at integers. Planar pose: Collins and Bartoli 2014,
+Detection: hecbench.apriltags. Planar pose: Collins and Bartoli 2014,
 "Infinitesimal plane-based pose estimation", both solutions, each refined on every edge between a black and a
 white cell of the tag (tag_edges.py): some hundred edge points instead of four corners.
 """
@@ -9,13 +8,11 @@ white cell of the tag (tag_edges.py): some hundred edge points instead of four c
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import se3
+from hecbench import apriltags, se3
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel
 from hecbench.se3 import Array
@@ -25,8 +22,6 @@ from hecbench_hardware.tag_edges import FAMILIES, TagRefused
 
 Grey = NDArray[np.uint8]
 
-_MOST_WRONG_BITS = 2
-_LEAST_MARGIN = 20.0
 _MARGIN_CELLS = 0.7
 _LARGE_PX = 1000
 """Larger pictures are first searched at half their size; the edges are measured at full size in any case."""
@@ -122,40 +117,24 @@ def _grey(image: NDArray[np.uint8]) -> Grey:
     return np.ascontiguousarray(image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_RGB2GRAY))
 
 
-@cache
-def _detector(family: str, decimate: float) -> Any:
-    from pupil_apriltags import Detector
-
-    return Detector(families=family, nthreads=1, quad_decimate=decimate, refine_edges=1)
-
-
-def _detected(grey: Grey, family: str, decimate: float = 1.0) -> list[tuple[int, Array]]:
-    """Id and corners (4, 2) px of every credible tag of a family."""
-    return [
-        (int(tag.tag_id), np.asarray(tag.corners, float) - 0.5)
-        for tag in _detector(family, decimate).detect(grey)
-        if tag.hamming <= _MOST_WRONG_BITS and tag.decision_margin > _LEAST_MARGIN
-    ]
-
-
 def _the_tag(grey: Grey, target: AprilTagTarget) -> Array:
     """The corners of the one tag of the target's family and id."""
     if target.family not in FAMILIES:
         raise InputError(f"target.family: '{target.family}' is not one of {', '.join(FAMILIES)}")
-    found: list[tuple[int, Array]] = []
+    found: list[apriltags.Tag] = []
     same: list[Array] = []
     for decimate in (2.0, 1.0) if max(grey.shape) > _LARGE_PX else (1.0,):
-        found = _detected(grey, target.family, decimate)
-        if same := [corners for tag_id, corners in found if tag_id == target.id]:
+        found = apriltags.detected(grey, target.family, decimate)
+        if same := [tag.corners_px for tag in found if tag.id == target.id]:
             break
     if len(same) > 1:
         raise TagRefused(f"{len(same)} tags have id {target.id} of {target.family}: cover all but one")
     if same:
         return same[0]
-    seen = {f"{target.family} id {tag_id}" for tag_id, _ in found}
+    seen = {f"{target.family} id {tag.id}" for tag in found}
     for family in FAMILIES:
         if family != target.family:
-            seen |= {f"{family} id {tag_id}" for tag_id, _ in _detected(grey, family)}
+            seen |= {f"{family} id {tag.id}" for tag in apriltags.detected(grey, family)}
     wanted = f"{target.family} id {target.id}"
     if seen:
         raise TagRefused(f"{wanted} is not in the picture, but {', '.join(sorted(seen))}: name the right tag")

@@ -6,7 +6,7 @@ import pytest
 from hecbench_hardware import tag_edges, tags
 from hecbench_hardware.tag_edges import TagRefused
 
-from hecbench import se3
+from hecbench import apriltags, se3
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel
 from hecbench.targets import AprilTagTarget
@@ -131,10 +131,8 @@ def test_wrong_camera_is_bad_input():
     ],
 )
 def test_real_pictures_agree_with_the_pose_of_the_detection_library(shared, name, fx, fy, cx, cy):
-    from pupil_apriltags import Detector
-
     picture = cv2.imread(str(shared / "data" / "pupil_tags" / name), cv2.IMREAD_GRAYSCALE)
-    detector = Detector(families="tag36h11")
+    detector = apriltags.detector("tag36h11", 2.0)
     theirs = detector.detect(picture, estimate_tag_pose=True, camera_params=(fx, fy, cx, cy), tag_size=0.065)[
         0
     ]

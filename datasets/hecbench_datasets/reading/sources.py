@@ -21,6 +21,9 @@ from hecbench.recording import Recording
 
 Array = NDArray[np.float64]
 
+_MOST_PARTS = 2_000_000
+"""Values of one file: a recording of 10,000 samples with 40 corners each has half of that."""
+_DEEPEST = 1000
 YAML_SUFFIXES = (".yaml", ".yml")
 IMAGE_SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff")
 
@@ -52,9 +55,11 @@ def foreign(load: Callable[[Path], Recording]) -> Callable[[Path], Recording]:
 def head(path: Path, count: int = 4096) -> str:
     """The first characters of a file for sniffing; empty when it is none or unreadable."""
     try:
+        if not path.is_file():
+            return ""
         with path.open("rb") as stream:
             return stream.read(count).decode("utf-8", "replace")
-    except OSError:
+    except (OSError, ValueError):
         return ""
 
 
@@ -103,11 +108,42 @@ def yaml_text(content: str, source: str) -> Any:
 
     Loader.add_constructor("tag:yaml.org,2002:opencv-matrix", _opencv_matrix)
     content = re.sub(r"\A%YAML:1\.\d\s*(\n---)?", "", content)
+    if _depth(content) > _DEEPEST:
+        raise InputError(f"{source}: is nested more than {_DEEPEST} deep; it is no recording")
     try:
-        return yaml.load(content, Loader)
+        loader = Loader(content)
+        node = loader.get_single_node()
+        return loader.construct_document(bounded(node, source)) if node else None
     except (yaml.YAMLError, ValueError, TypeError, KeyError, RecursionError) as error:
         reason = " ".join(str(error).split())
         raise InputError(f"{source}: is not readable YAML ({reason})") from error
+
+
+def _depth(content: str) -> int:
+    """A bound of how deeply YAML is nested: open brackets, or what leads a line. LibYAML's stack has none."""
+    brackets = np.frombuffer(content.encode(), np.uint8)
+    steps = np.isin(brackets, (*b"[{",)).astype(int) - np.isin(brackets, (*b"]}",))
+    led = max(map(len, re.findall(r"^[ ?:\t-]+", content, re.MULTILINE)), default=0)
+    return max(int(np.cumsum(steps).max(initial=0)), led)
+
+
+def bounded(value: Any, source: str) -> Any:
+    """The value (or YAML node), unless it has too many parts, counted as often as they are referred to.
+
+    A few hundred bytes of aliases within aliases stand for more than any memory holds.
+    """
+    waiting, count = [value], 0
+    while waiting:
+        part = waiting.pop()
+        part = getattr(part, "value", part)
+        if isinstance(part, dict | list | tuple):
+            count += len(part)
+            if count > _MOST_PARTS:
+                raise InputError(
+                    f"{source}: holds or repeats more than {_MOST_PARTS} values; cut it into pieces"
+                )
+            waiting.extend(part.values() if isinstance(part, dict) else part)
+    return value
 
 
 def _opencv_matrix(loader: Any, node: Any) -> Array:
@@ -184,6 +220,8 @@ def picture(content: bytes, mode: str, source: str) -> NDArray[np.uint8]:
 def zip_names(path: Path) -> list[str]:
     """Names of the files in an archive; none when it is not a readable one."""
     try:
+        if not path.is_file():
+            return []
         with zipfile.ZipFile(path) as archive:
             return [name for name in archive.namelist() if not name.endswith("/")]
     except (OSError, zipfile.BadZipFile, ValueError):

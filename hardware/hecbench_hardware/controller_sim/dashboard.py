@@ -17,6 +17,8 @@ SERIAL_NUMBER = "20205501234"
 INSTALLATION = "default.installation"
 _LONGEST_COMMAND = 4
 _FLIGHT_REPORTS = ("controller", "software", "system")
+_ACTS = frozenset({"play", "stop", "power on", "power off", "brake release", "unlock protective stop"})
+"""What changes whether the arm may move, and is noted."""
 _OPERATIONAL_MODES = ("manual", "automatic")
 
 
@@ -28,6 +30,8 @@ class Dashboard:
     version: tuple[int, int, int, int]
     loaded: str = ""
     operational_mode: str = ""
+    marked: bool = True
+    """Whether the version says that no metal moves; without the mark it is taken for a real controller."""
     _commands: dict[str, Callable[[str], str]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -49,7 +53,9 @@ class Dashboard:
             "addtolog": self._add_to_log,
             "isprogramsaved": lambda _: f"true {self.loaded or '<unnamed>'}",
             "programstate": lambda _: f"{self.program.runtime.name} {self.loaded or self.program.name}",
-            "polyscopeversion": lambda _: f"URSoftware {self._number()} {SIMULATED}",
+            "polyscopeversion": lambda _: (
+                f"URSoftware {self._number()}{f' {SIMULATED}' if self.marked else ''}"
+            ),
             "version": lambda _: self._number(),
             "set operational mode": self._set_operational_mode,
             "get operational mode": lambda _: self.operational_mode.upper() or "NONE",
@@ -79,8 +85,10 @@ class Dashboard:
         """The controller's answer to one command."""
         words = line.split()
         for count in range(min(_LONGEST_COMMAND, len(words)), 0, -1):
-            command = self._commands.get(" ".join(words[:count]).lower())
-            if command:
+            name = " ".join(words[:count]).lower()
+            if command := self._commands.get(name):
+                if name in _ACTS:
+                    self.program.arm.note(f"dashboard: {name}")
                 return command(" ".join(words[count:]))
         return f"could not understand: '{line.strip()[:100]}'"
 

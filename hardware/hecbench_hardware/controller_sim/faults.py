@@ -55,6 +55,7 @@ class Faults:
             "gripper_jam": lambda _: setattr(self.gripper, "jammed", True),
             "gripper_silent": lambda _: setattr(self.gripper, "silent", True),
             "gripper_object": lambda x: setattr(self.gripper, "object_at", int(_within(x[0], 0, 255))),
+            "unmarked": lambda _: setattr(self.dashboard, "marked", False),
             "reset": lambda _: self._reset(),
         }
 
@@ -76,6 +77,7 @@ class Faults:
             return str(np.abs(arm.joint_speeds).max())
         if name not in self._verbs:
             return f"unknown fault '{name}': choose one of {', '.join(self._verbs)}, log, speed"
+        arm.note(f"injected: {line.strip()}")
         try:
             self._verbs[name]([float(word) for word in words])
         except (ValueError, IndexError):
@@ -105,7 +107,8 @@ class Faults:
         vars(arm).update(vars(fresh))
         arm.joints = np.array(HOME_RAD)
         vars(self.gripper).update(vars(RobotiqSocket()))
-        program.remote, self.stream_frozen, self.link_back_s = True, False, 0.0
+        program.remote = self.dashboard.marked = True
+        self.stream_frozen, self.link_back_s = False, 0.0
 
 
 def _within(value: float, low: float, high: float) -> float:

@@ -54,6 +54,7 @@ def move_joints(
     arm: SimulatedArm, target: ArrayLike, speed: float, acceleration: float, duration_s: float = 0.0
 ) -> Motion:
     """Straight in joint space, rad/s and rad/s^2 of the leading joint."""
+    arm.note("motion: joints")
     start, end = arm.joints.copy(), np.array(target, float)
     require_finite("movej", end, speed, acceleration, duration_s)
     if np.abs(end).max() > arm.arm.joint_range_rad:
@@ -70,6 +71,7 @@ def move_linear(
     arm: SimulatedArm, base_T_target: Array, speed: float, acceleration: float, duration_s: float = 0.0
 ) -> Motion:
     """Straight in space, m/s and m/s^2, rotation at the same pace."""
+    arm.note("motion: line")
     require_finite("movel", base_T_target, speed, acceleration, duration_s)
     start = arm.base_T_tcp
     turn = se3.so3_log(base_T_target[:3, :3] @ start[:3, :3].T)
@@ -86,6 +88,7 @@ def move_circular(
     arm: SimulatedArm, base_T_via: Array, base_T_target: Array, speed: float, acceleration: float
 ) -> Motion:
     """Along the circle from here through a point to a pose, m/s and m/s^2; rotation at the same pace."""
+    arm.note("motion: arc")
     require_finite("movec", base_T_via, base_T_target, speed, acceleration)
     start = arm.base_T_tcp
     a, b, c = start[:3, 3], base_T_via[:3, 3], base_T_target[:3, 3]

@@ -16,6 +16,7 @@ from hecbench.errors import InputError
 from hecbench.registry import hookimpl
 from hecbench.specs import DeviceSpec, Kind
 from hecbench_hardware.devices import DeviceFault, Fault, GripperStatus
+from hecbench_hardware.grippers.guard import Guarded
 from hecbench_hardware.options import number, text
 
 UNIT = 65
@@ -30,7 +31,7 @@ _SHORTEST_BODY = 2
 
 
 @dataclass
-class OnRobotGripper:
+class OnRobotGripper(Guarded):
     """Connected. A command that does not end within `timeout_s` is a fault."""
 
     host: str
@@ -65,13 +66,15 @@ class OnRobotGripper:
 
     def stop(self) -> None:
         """Hold the fingers where they are."""
-        self._write(_TARGET_FORCE + 2, [_STOP])
+        if self.enabled:
+            self._write(_TARGET_FORCE + 2, [_STOP])
 
     def close(self) -> None:
         """Disconnect."""
         self._socket.close()
 
     def _go(self, width_m: float, force_n: float) -> None:
+        self.refuse_disabled()
         if not 0 <= width_m <= STROKE_M:
             raise InputError(f"a width of {width_m} m is not within 0 to {STROKE_M} m")
         if not 0 < force_n <= MAX_FORCE_N:

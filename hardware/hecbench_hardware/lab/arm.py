@@ -101,6 +101,9 @@ class LabGripper:
         self._width_m = opening_m
         self.holds: Callable[[], bool] = lambda: False
 
+    def enable(self) -> None:
+        """Nothing real can move."""
+
     def open_fingers(self, width_m: float | None = None) -> None:
         """Open."""
         self._width_m = self._opening_m if width_m is None else width_m

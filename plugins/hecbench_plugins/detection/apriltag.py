@@ -1,18 +1,13 @@
-"""AprilTags by pupil-apriltags (Wang and Olson 2016, "AprilTag 2: efficient and robust fiducial detection").
-
-The library puts pixel centres at half integers and orders corners as the recording format does: bottom-left,
-bottom-right, top-right, top-left of the official tag.
-"""
+"""The AprilTag of a target in a recording's pictures."""
 
 from __future__ import annotations
 
 from collections import Counter
-from functools import cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from hecbench import apriltags
 from hecbench.errors import InputError, TargetNotSeen
 from hecbench.targets import ANY_TAG, AprilTagTarget
 
@@ -20,15 +15,6 @@ Array = NDArray[np.float64]
 Grey = NDArray[np.uint8]
 
 FAMILIES = ("tag36h11", "tag25h9", "tag16h5", "tagCircle21h7", "tagStandard41h12")
-_MOST_WRONG_BITS = 2
-_LEAST_MARGIN = 20.0
-
-
-@cache
-def _detector(family: str, decimate: float) -> Any:
-    from pupil_apriltags import Detector
-
-    return Detector(families=family, nthreads=1, quad_decimate=decimate, refine_edges=1)
 
 
 def tags(grey: Grey, family: str) -> dict[int, Array]:
@@ -40,15 +26,11 @@ def tags(grey: Grey, family: str) -> dict[int, Array]:
     if family not in FAMILIES:
         raise InputError(f"target.family: '{family}' is not one of {', '.join(FAMILIES)}")
     for decimate in (1.0, 2.0):
-        found = [
-            tag
-            for tag in _detector(family, decimate).detect(np.ascontiguousarray(grey))
-            if tag.hamming <= _MOST_WRONG_BITS and tag.decision_margin > _LEAST_MARGIN
-        ]
+        found = apriltags.detected(grey, family, decimate)
         if found:
             break
-    found.sort(key=lambda tag: tag.decision_margin)
-    return {int(tag.tag_id): np.asarray(tag.corners, float) - 0.5 for tag in found}
+    found.sort(key=lambda tag: tag.margin)
+    return {tag.id: tag.corners_px for tag in found}
 
 
 def find(greys: list[Grey | None], target: AprilTagTarget) -> tuple[AprilTagTarget, list[Array | None]]:

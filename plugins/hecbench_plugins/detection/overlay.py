@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from hecbench import files
 from hecbench.recording import Recording
-from hecbench.recording_io import encode_png
+from hecbench.storage.recording_io import encode_png
 
 Picture = NDArray[np.uint8]
 
@@ -54,7 +54,7 @@ def write_overlays(recording: Recording, folder: Path) -> list[Path]:
     written = []
     for i, sample_id in enumerate(recording.sample_ids):
         if recording.images is not None and recording.images[i] is not None:
-            path = folder / f"{sample_id}.png"
+            path = folder / f"{files.safe_name(sample_id)}.png"
             files.write_bytes(path, encode_png(overlay(recording, i)))
             written.append(path)
     return written
