@@ -20,7 +20,7 @@ from hecbench.specs import (
 )
 
 if TYPE_CHECKING:
-    from hecbench.trial_record import TrialRecord
+    from hecbench.storage.trial_record import TrialRecord
 
 GROUP = "hecbench"
 """The entry-point group and the prefix of every hook."""

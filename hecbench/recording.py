@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from hecbench import se3
 from hecbench.errors import InputError, Refusal
-from hecbench.needs import Need
 from hecbench.targets import Target
 
 Array = NDArray[np.float64]
@@ -25,6 +24,19 @@ ImageSource = Path | Image | None
 
 DISTORTION_LENGTHS = (0, 4, 5, 8, 12, 14)
 _ROTATION_TOLERANCE = 1e-3
+
+
+class Need(StrEnum):
+    """What a recording can offer, and what a solver asks of it."""
+
+    TARGET_POSES = "target_poses"
+    CORNERS = "corners"
+    INTRINSICS = "intrinsics"
+    IMAGES = "images"
+    MASKS = "masks"
+    JOINTS = "joints"
+    ROBOT_MODEL = "robot_model"
+    INITIAL = "initial"
 
 
 class Mounting(StrEnum):
@@ -43,6 +55,11 @@ class RobotDescription:
     base_link: str = "base"
     flange_link: str = "tool0"
     joint_names: tuple[str, ...] = ()
+
+    @property
+    def source(self) -> str | Path | None:
+        """What `load_robot` takes: the URDF where there is one, or the name; None when neither is known."""
+        return self.urdf or self.model
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,7 +224,7 @@ class Recording:
         """H (N, 4, 4) m, NaN rows where absent, that folds both mountings into one model.
 
         H is base_T_flange (eye_to_hand) or flange_T_base (eye_in_hand), so that with the answer
-        X = parent_T_camera and the constant Y = other_T_target: ``camera_T_target = inverse(X) @ H @ Y``.
+        X = parent_T_camera and the constant Y = carrier_T_target: ``camera_T_target = inverse(X) @ H @ Y``.
 
         Raises:
             Refusal: no sample has base_T_flange.
@@ -229,7 +246,7 @@ class Recording:
             Need.IMAGES: self.images is not None and any(image is not None for image in self.images),
             Need.MASKS: self.masks is not None and any(mask is not None for mask in self.masks),
             Need.JOINTS: self.joints_rad is not None,
-            Need.ROBOT_MODEL: self.robot is not None and (self.robot.model or self.robot.urdf) is not None,
+            Need.ROBOT_MODEL: self.robot is not None and self.robot.source is not None,
             Need.INITIAL: self.initial_parent_T_camera is not None,
         }
         return frozenset(need for need, present in has.items() if present)

@@ -1,11 +1,12 @@
 """Discovery of plugins. Broken, conflicting and not-ready plugins are data to be listed, never crashes.
 
-An entry point of group ``hecbench`` names a module with hooks, or a package whose ``plugin_modules`` lists
-modules with hooks. Every module is imported inside its own ``try``, so one bad file costs one plugin.
+An entry point of group ``hecbench`` names a module with hooks, or a package whose ``plugin_folders`` names folders of
+such modules. Every module is imported inside its own ``try``, so one bad file costs one plugin.
 """
 
 from __future__ import annotations
 
+import pkgutil
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
@@ -146,7 +147,7 @@ def _plugins_of(entry_point: metadata.EntryPoint, observers: dict[str, TrialObse
     except Exception as error:  # a stranger's module may raise anything at import
         yield broken(entry_point.name, error)
         return
-    for module_name in getattr(target, "plugin_modules", (target.__name__,)):
+    for module_name in _module_names(target):
         try:
             specs, observer = _implemented(import_module(module_name))
         except Exception as error:  # likewise
@@ -157,6 +158,18 @@ def _plugins_of(entry_point: metadata.EntryPoint, observers: dict[str, TrialObse
         for spec in specs:
             status, detail = _readiness(spec)
             yield Plugin(spec.name, spec.kind, status, distribution, version, detail, spec)
+
+
+def _module_names(target: ModuleType) -> Iterator[str]:
+    """The modules with hooks: those of `plugin_folders` ("." is the package itself), or the target alone."""
+    folders = getattr(target, "plugin_folders", None)
+    if folders is None:
+        yield target.__name__
+        return
+    for folder in folders:
+        package = target if folder == "." else import_module(f"{target.__name__}.{folder}")
+        found = pkgutil.iter_modules(package.__path__, prefix=f"{package.__name__}.")
+        yield from (module.name for module in found if not module.ispkg)
 
 
 def _implemented(module: ModuleType) -> tuple[list[AnySpec], TrialObserver | None]:

@@ -11,8 +11,8 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
-from hecbench.conventions import HINTS_NAME, readings
 from hecbench.errors import InputError
+from hecbench.exchange.conventions import HINTS_NAME, readings
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import DatasetSpec

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from hecbench.conventions import HINTS_NAME, readings
 from hecbench.errors import InputError
+from hecbench.exchange.conventions import HINTS_NAME, readings
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import DatasetSpec

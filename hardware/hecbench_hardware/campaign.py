@@ -20,9 +20,9 @@ from typing import Any
 
 import numpy as np
 
-from hecbench import recording_io
 from hecbench.errors import HecbenchError, InputError
 from hecbench.recording import CameraModel, Mounting, Recording
+from hecbench.storage import recording_io
 from hecbench_hardware.cameras.images import ImageFolder
 from hecbench_hardware.controller_sim.process import SimulatedController
 from hecbench_hardware.devices import DeviceFault

@@ -84,8 +84,8 @@ def record(
     CELL describes camera, target and mounting. Its samples are the plan, or with --poses the first one is the
     start of a planned one, or with --freedrive they are not used. The checked plan is written to OUT/plan.json.
     """
-    from hecbench import recording_io
     from hecbench.specs import Kind
+    from hecbench.storage import recording_io
     from hecbench_hardware.arming import Operator, take_control
     from hecbench_hardware.devices import FollowsRobot, KnowsTruth
     from hecbench_hardware.recorder.record import Recorder
@@ -198,11 +198,10 @@ def _print(recording: Recording, out: Path, as_json: bool) -> None:
     import msgspec
 
     from hecbench.diagnose import Severity, check
-    from hecbench.runner import prepare
 
     if not as_json:
         click.echo(f"{out}: {len(recording)} samples")
-    findings = check(recording, prepare)
+    findings = check(recording)
     if as_json:
         answer = {
             "recording": str(out),

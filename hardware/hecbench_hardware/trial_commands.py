@@ -14,7 +14,7 @@ import click
 from hecbench.errors import InputError
 
 if TYPE_CHECKING:
-    from hecbench.trial_record import Contents, TrialRecord
+    from hecbench.storage.trial_record import Contents, TrialRecord
     from hecbench_hardware.lab.trial_cell import LabCell
     from hecbench_hardware.trials.runner import Plan
 
@@ -115,7 +115,7 @@ def _trial(task_name: str, given: dict[str, Any]) -> None:
 
 def _draw(plan: Plan, cell: LabCell, out: Path) -> None:
     """The first trial of a task as pictures, which the report shows."""
-    from hecbench.trial_record import picture_name
+    from hecbench.storage.trial_record import picture_name
     from hecbench_hardware.lab import pictures
 
     if cell.camera is not None and not (out / picture_name(cell.name, plan.task, "png")).exists():
@@ -133,7 +133,7 @@ def _print(contents: Contents, out: Path, as_json: bool) -> None:
     """The table; exits with 1 when a planned trial ended without a verdict."""
     import msgspec
 
-    from hecbench import console
+    from hecbench.commands import console
     from hecbench.report import trials as report
 
     if as_json:

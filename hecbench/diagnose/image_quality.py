@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench.diagnose.case import Case
+from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity, names
 from hecbench.errors import InputError
 from hecbench.recording import Recording
@@ -18,7 +18,7 @@ _DARK, _BRIGHT = 8, 247
 _CURE = "look at these images; record these samples again"
 
 
-def examine(case: Case) -> tuple[Finding | None, Case]:
+def examine(case: Examination) -> tuple[Finding | None, Examination]:
     """Share of clipped pixels, sharpness around the target (mean squared Laplacian), and repeated images."""
     recording = case.recording
     indices = [i for i, source in enumerate(recording.images or ()) if source is not None]

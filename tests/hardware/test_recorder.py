@@ -18,10 +18,11 @@ from hecbench_hardware.recorder.record import Recorder
 from hecbench_hardware.recorder.session import FILE_NAME
 from PIL import Image
 
-from hecbench import recording_io, se3
+from hecbench import se3
 from hecbench.errors import HecbenchError, InputError
 from hecbench.next_view import RobotView
 from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
+from hecbench.storage import recording_io
 from hecbench.targets import AprilTagTarget
 
 ARM = ARMS["ur5e"]
@@ -212,8 +213,8 @@ def test_diverse_plan(cell, ready_pose):
         poses = ARM.forward(joints)
         return poses if cell.mounting is Mounting.EYE_TO_HAND else se3.inverse(poses)
 
-    other_T_target = se3.inverse(hands(ready_pose)) @ cell.initial_parent_T_camera @ cell.camera_T_target[0]
-    camera_T_target = se3.inverse(cell.initial_parent_T_camera) @ hands(planned.joints_rad) @ other_T_target
+    carrier_T_target = se3.inverse(hands(ready_pose)) @ cell.initial_parent_T_camera @ cell.camera_T_target[0]
+    camera_T_target = se3.inverse(cell.initial_parent_T_camera) @ hands(planned.joints_rad) @ carrier_T_target
     points = se3.transform_points(camera_T_target, cell.target.points_m) @ K.T
     px = points[..., :2] / points[..., 2:]
     assert (points[..., 2] > 0).all()

@@ -16,9 +16,9 @@ from hecbench_hardware.kinematics import ARMS
 from hecbench_hardware.lab import cells
 from hecbench_hardware.trial_commands import trial
 
-from hecbench import recording_io
 from hecbench.estimate import Estimate
 from hecbench.recording import Mounting, Recording, RobotDescription
+from hecbench.storage import recording_io
 
 MADE_READY = ("motion", "unlock", "power on", "brake release")
 

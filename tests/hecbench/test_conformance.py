@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 
 from hecbench import conformance, registry, se3
+from hecbench.conformance import solvers
 from hecbench.errors import Refusal
 from hecbench.estimate import Estimate
 from hecbench.specs import Kind, Need, SolverSpec
 
 CHECKED = [
-    spec for spec in registry.load().ready(Kind.SOLVER, SolverSpec) if spec.needs <= conformance._SUPPORTED
+    spec for spec in registry.load().ready(Kind.SOLVER, SolverSpec) if spec.needs <= solvers._SUPPORTED
 ]
 
 

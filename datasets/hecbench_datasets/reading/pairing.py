@@ -9,8 +9,8 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from hecbench.conventions import Reading, prove, readings
 from hecbench.errors import InputError
+from hecbench.exchange.conventions import Reading, prove, readings
 from hecbench.recording import Mounting, Recording
 from hecbench_datasets.reading.hints import Hints
 

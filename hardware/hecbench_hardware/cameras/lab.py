@@ -59,7 +59,7 @@ class LabCamera:
 
     def with_truth(self, recording: Recording) -> Recording:
         """The recording with the robot's mask of every picture and the camera's true pose, saved in its folder."""
-        from hecbench import recording_io
+        from hecbench.storage import recording_io
 
         assert recording.joints_rad is not None
         assert recording.folder is not None
@@ -83,7 +83,7 @@ class LabCamera:
 
 def open_camera(options: Mapping[str, str]) -> LabCamera:
     """The camera of one of the lab's calibrations; `cell`, a recording, gives other optics and another place."""
-    from hecbench import recording_io
+    from hecbench.storage import recording_io
     from hecbench_hardware.lab import cells
     from hecbench_hardware.lab.eye import Eye, Sensor
 

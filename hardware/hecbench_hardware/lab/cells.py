@@ -15,7 +15,7 @@ import numpy as np
 from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel
-from hecbench.robot import RobotModel, load_robot
+from hecbench.robots.model import RobotModel, load_robot
 from hecbench.se3 import Array
 from hecbench_hardware.kinematics import ARMS, JOINT_NAMES, Arm
 from hecbench_hardware.lab.scene import FlangeTag, Scene, Surroundings
@@ -39,7 +39,7 @@ class Station:
     Attributes:
         name: of the arm, as the lab calls it.
         arm: its kinematics.
-        model: name or URDF for `hecbench.robot.load_robot`.
+        model: name or URDF for `hecbench.robots.model.load_robot`.
         gripper: carried by the flange.
         base_T_room: (4, 4) m.
         configurations_rad: (C, J) where the calibrations are made.

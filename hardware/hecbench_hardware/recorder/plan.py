@@ -22,7 +22,7 @@ _PATIENCE_S = 2.0
 
 
 @dataclass(frozen=True)
-class Step:
+class PlannedPose:
     """One motion of a checked plan."""
 
     id: str
@@ -43,7 +43,7 @@ def planned_joints(plan: Recording) -> Array:
     return joints
 
 
-def check_plan(arm: Arm, plan: Recording, start: Array, limits: Limits) -> list[Step]:
+def check_plan(arm: Arm, plan: Recording, start: Array, limits: Limits) -> list[PlannedPose]:
     """Check every motion of a plan from joints `start` (6,) rad on; nothing moves.
 
     Raises:
@@ -57,12 +57,12 @@ def check_plan(arm: Arm, plan: Recording, start: Array, limits: Limits) -> list[
             raise InputError(f"{plan.name}: sample {sample_id}: {error}") from None
         length = float(np.abs(there - here).max())
         expected_s = motion_time_s(length, limits.joint_speed_rad_s, limits.joint_acceleration_rad_s2)
-        steps.append(Step(sample_id, there.tolist(), arm.forward(there).tolist(), expected_s))
+        steps.append(PlannedPose(sample_id, there.tolist(), arm.forward(there).tolist(), expected_s))
         here = there
     return steps
 
 
-def dry_run(arm: Arm, plan: Recording, start: Array, limits: Limits) -> list[Step]:
+def dry_run(arm: Arm, plan: Recording, start: Array, limits: Limits) -> list[PlannedPose]:
     """Check a plan and drive it on a simulated controller of its own; nothing else gets a byte.
 
     Raises:
@@ -86,7 +86,7 @@ def dry_run(arm: Arm, plan: Recording, start: Array, limits: Limits) -> list[Ste
     return driven
 
 
-def write_plan(steps: list[Step], path: Path) -> None:
+def write_plan(steps: list[PlannedPose], path: Path) -> None:
     """Write the checked plan as JSON: what would be sent, in order, with its time and tool positions."""
     positions = np.array([step.base_T_flange for step in steps])
     content = {

@@ -78,13 +78,13 @@ def diverse_plan(
     Raises:
         InputError: The cell lacks something, or fewer than `count` poses can be reached and seen.
     """
-    seen, parent_T_camera, other_T_target, start = _seed(cell, arm)
+    seen, parent_T_camera, carrier_T_target, start = _seed(cell, arm)
     camera, target = cell.camera, cell.target
     assert camera
     assert target
     camera_T_target = _candidates(seen, view or View(), rng)
     camera_T_target = camera_T_target[_in_view(camera_T_target, camera, target.points_m)]
-    hand = parent_T_camera @ camera_T_target @ se3.inverse(other_T_target)
+    hand = parent_T_camera @ camera_T_target @ se3.inverse(carrier_T_target)
     base_T_flange = hand if cell.mounting is Mounting.EYE_TO_HAND else se3.inverse(hand)
     joints = _reachable(base_T_flange, arm, start, limits)
     chosen = [start]
@@ -175,7 +175,7 @@ def _toured(cell: Recording, chosen: Array, arm: Arm, limits: Limits, count: int
 
 
 def _seed(cell: Recording, arm: Arm) -> tuple[Array, Array, Array, Array]:
-    """camera_T_target, parent_T_camera, other_T_target (4, 4) and joints (6,) of the first sample."""
+    """camera_T_target, parent_T_camera, carrier_T_target (4, 4) and joints (6,) of the first sample."""
     needed = {
         "camera.K": cell.camera and cell.camera.K,
         "target": cell.target,

@@ -13,7 +13,7 @@ import numpy as np
 from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.se3 import Array
-from hecbench.trial_record import Outcome, TrialRecord
+from hecbench.storage.trial_record import Outcome, TrialRecord
 from hecbench_hardware.devices import DeviceFault, Fault
 from hecbench_hardware.kinematics import Arm
 from hecbench_hardware.trials import solids, tasks
