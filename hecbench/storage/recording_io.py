@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import files
+from hecbench import files, pictures
 from hecbench.errors import InputError
 from hecbench.estimate import plain
 from hecbench.recording import CameraModel, ImageSource, Mounting, Recording, RobotDescription
@@ -339,7 +339,9 @@ def _store_pictures(
             names.append(None)
         elif isinstance(source, np.ndarray):
             name = _free_name(kind, f"{files.safe_name(sample_id)}.png", taken)
-            files.write_bytes(folder / name, encode_png(source))
+            where = f"samples[{len(names)}].{kind.removesuffix('s')}"
+            picture = pictures.image(source, where) if kind == "images" else _mask_picture(source, where)
+            files.write_bytes(folder / name, encode_png(picture))
             names.append(name)
         else:
             if source not in stored:
@@ -347,6 +349,10 @@ def _store_pictures(
                 files.write_bytes(folder / stored[source], files.read_bytes(source))
             names.append(stored[source])
     return names
+
+
+def _mask_picture(mask: NDArray[Any], where: str) -> NDArray[np.uint8]:
+    return pictures.mask(mask, where).astype(np.uint8) * np.uint8(255)
 
 
 def _free_name(kind: str, name: str, taken: set[str]) -> str:
