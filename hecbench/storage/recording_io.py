@@ -112,12 +112,13 @@ def is_recording(path: Path) -> bool:
     return (path / FILE_NAME).is_file() or (path.is_file() and path.name == FILE_NAME)
 
 
-def load(path: Path) -> Recording:
+def load(path: str | Path) -> Recording:
     """Read a recording folder (or its JSON file). No image is decoded, and images may be absent.
 
     Raises:
         InputError: with the file, the key, the value and the cure.
     """
+    path = Path(path)
     file = path if path.name == FILE_NAME and not path.is_dir() else path / FILE_NAME
     content = files.read_bytes(file)
     try:
@@ -263,11 +264,12 @@ def _inside(folder: Path, key: str, name: str) -> Path:
     return path
 
 
-def save(recording: Recording, folder: Path) -> None:
+def save(recording: Recording, folder: str | Path) -> None:
     """Write a recording folder; images and masks in memory or elsewhere are stored as PNG or copied in.
 
     The JSON file is written last and atomically, so a folder with `recording.json` is complete.
     """
+    folder = Path(folder)
     images = _store_pictures(recording.images, folder, "images", recording.sample_ids)
     masks = _store_pictures(recording.masks, folder, "masks", recording.sample_ids)
     samples = [
