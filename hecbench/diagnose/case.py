@@ -37,6 +37,7 @@ class Examination:
         judged: False once the data cannot be fitted, with the reason in a finding.
         size_factor: by which the declared size of the target is multiplied.
         explained: ids of samples whose fault has been named.
+        noise_px: rms distance that a corner keeps from its own picture's target pose; None when unknown.
     """
 
     recording: Recording
@@ -44,6 +45,7 @@ class Examination:
     judged: bool = True
     size_factor: float = 1.0
     explained: frozenset[str] = frozenset()
+    noise_px: float | None = None
 
     @staticmethod
     def of(recording: Recording, prepared: Recording | None = None) -> Examination:

@@ -19,6 +19,7 @@ from hecbench.diagnose import (
     next_pose,
     outlier_sample,
     pairing,
+    picture_residual,
     planar_ambiguity,
     pose_direction_or_mounting,
     rotation_diversity,
@@ -32,6 +33,7 @@ from hecbench.recording import Recording
 
 _STEPS: tuple[Callable[[Examination], tuple[Finding | None, Examination]], ...] = (
     image_quality.examine,
+    picture_residual.examine,
     joints_vs_pose.examine,
     sample_moving.examine,
     rotation_diversity.examine,
