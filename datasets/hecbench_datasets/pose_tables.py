@@ -11,8 +11,9 @@ import re
 from collections.abc import Iterable
 from pathlib import Path
 
-from hecbench.conventions import HINTS_NAME, readings
+from hecbench.conventions import HINTS_NAME
 from hecbench.errors import InputError
+from hecbench.pose_numbers import readings
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import DatasetSpec

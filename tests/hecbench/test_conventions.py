@@ -5,9 +5,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from hecbench import se3
-from hecbench.conventions import prove, readings, stillness
+from hecbench.conventions import prove
 from hecbench.errors import InputError
+from hecbench.pose_numbers import readings
 from hecbench.recording import Mounting
+from hecbench.stillness import stillness
 
 BOTH = tuple(Mounting)
 ROBOT, TARGET = ("base", "flange"), ("camera", "target")
