@@ -18,7 +18,7 @@ from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.pose_numbers import Reading
 from hecbench.recording import Mounting
-from hecbench.stillness import Stillness, length_factor, stillness, turns_about_one_axis
+from hecbench.stillness import Stillness, length_factor, rotation_misfits, stillness, turns_about_one_axis
 
 Array = NDArray[np.float64]
 
@@ -30,22 +30,28 @@ _CURE = f"write which is meant (mounting, robot_pose, target_pose ...) into {HIN
 _STILL = 0.3
 _CLEARLY_WORSE = 3.0
 _LEAST_SAMPLES = 5
-_ANGLE_SLACK_RAD = np.deg2rad(3.0)
+_ROTATION_SLACK = 0.1
+"""Of the turns, by which rotations that are right may disagree: a degree of noise in ten."""
 _CONVINCING = 0.1
 """Of the motion, as `Stillness.relative`: real cells leave 0.002 to 0.05."""
 _SAME = 1e-6
-_MOST_EXAMINED = 40
+_MOST_EXAMINED = 20
+_MOST_NAMED = 3
 _MIRROR = np.array([1.0, -1.0, 1.0, 1.0])
 
 
 @dataclass(frozen=True, eq=False)
 class Proof:
-    """The reading that was chosen; `note` says which, how still it holds the target, and what was refused."""
+    """The reading that was chosen; `note` says which, how still it holds the target, and what was refused.
+
+    `robot_text` is the text of the robot's reading.
+    """
 
     mounting: Mounting
     base_T_flange: Array
     camera_T_target: Array
     note: str
+    robot_text: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +69,17 @@ class _Candidate:
     def name(self) -> str:
         return f"{self.mounting}, {self.robot.text}, {self.target.text}"
 
+    def beside(self, other: _Candidate) -> str:
+        """Its name, without units that are the other's too."""
+        units = [
+            (mine.text.split(" in ", 1), its.text.split(" in ", 1)) for mine, its in self._pairs_with(other)
+        ]
+        short = [mine[0] if mine[1:] == its[1:] else " in ".join(mine) for mine, its in units]
+        return f"{self.mounting} with {' and '.join(short)}"
+
+    def _pairs_with(self, other: _Candidate) -> tuple[tuple[Reading, Reading], ...]:
+        return (self.robot, other.robot), (self.target, other.target)
+
     @property
     def hand_poses(self) -> Array:
         return _hand(self.mounting, self.robot.poses)
@@ -71,8 +88,7 @@ class _Candidate:
         """Whether both are the same poses under two names."""
         same = self.mounting is other.mounting
         return same and all(
-            np.allclose(mine.poses, its.poses, atol=_SAME)
-            for mine, its in ((self.robot, other.robot), (self.target, other.target))
+            np.allclose(mine.poses, its.poses, atol=_SAME) for mine, its in self._pairs_with(other)
         )
 
     @property
@@ -112,6 +128,7 @@ def prove(
     if count >= _LEAST_SAMPLES and min(c.stillness.relative for c in candidates) > _CONVINCING:
         candidates = list(_candidates(robot, target, mountings, told))
     documented = [c for c in candidates if c.deviations == 0]
+    settled = _count(robot) * _count(target) * len(mountings) == 1
     if count < _LEAST_SAMPLES:
         if len(documented) != 1:
             raise InputError(
@@ -123,7 +140,9 @@ def prove(
     still = [c for c in candidates if c.stillness.relative <= limit]
     if any(turns_about_one_axis(c.robot.poses) for c in still):
         return _documented_only(source, documented)
-    fitting = _distinct([c for c in still if c.deviations == min(s.deviations for s in still)])
+    possible = still if settled else [c for c in still if c.sees_target] or still
+    least = min((c.deviations for c in possible), default=0)
+    fitting = _distinct([c for c in possible if c.deviations == least])
     if len(fitting) > 1:
         fitting = [c for c in fitting if c.sees_target] or fitting
     if len(fitting) > 1:
@@ -132,9 +151,11 @@ def prove(
             f"{'; '.join(map(str, fitting[:6]))}; {_CURE}"
         )
     if fitting:
-        return _proof(fitting[0], f"{source}: {_margin(fitting[0], candidates, still, documented)}")
+        return _proof(
+            fitting[0], f"{source}: {_margin(fitting[0], candidates, still, documented if settled else [])}"
+        )
     ranked = sorted(candidates, key=lambda c: c.stillness.relative)
-    if len(documented) == 1:
+    if settled:
         note = f"{source}: read as documented, {documented[0]}; no reading holds the target still, "
         return _proof(documented[0], note + f"the best is {ranked[0]}: pairs mixed up, or too little motion?")
     raise InputError(
@@ -147,12 +168,17 @@ def _usual(stream: Sequence[Reading]) -> Sequence[Reading]:
     return [reading for reading in stream if not reading.unusual] or stream
 
 
+def _count(stream: Sequence[Reading]) -> int:
+    """How many readings depart from nothing that is documented."""
+    return sum(reading.deviations == 0 for reading in stream)
+
+
 def _documented_only(source: str, documented: Sequence[_Candidate]) -> Proof:
     """What is documented, where the motion proves nothing."""
     if len(documented) == 1:
         return _proof(
             documented[0],
-            f"{source}: read as documented, {documented[0]}; one axis of rotation proves no convention",
+            f"{source}: read as documented, {documented[0].name}; one axis of rotation proves no convention",
         )
     raise InputError(
         f"{source}: one axis of rotation proves no convention, and {len(documented)} readings are "
@@ -182,10 +208,11 @@ def _margin(
     if best.deviations and documented:
         usual = min(documented, key=lambda c: c.stillness.relative)
         note += f"; the documented reading does not: {usual}"
-    rivals = _distinct([c for c in still if not c.reads_as(best)])
+    rivals = [] if documented else _distinct([c for c in still if not c.reads_as(best)])[:_MOST_NAMED]
     worse = [c.stillness.relative for c in candidates if c not in still]
     if rivals:
-        note += f"; {'; '.join(c.name for c in rivals[:2])} would fit as well: if that is meant, {_CURE}"
+        names = " or ".join(rival.beside(best) for rival in rivals)
+        note += f"; {names} would fit as well: if that is meant, {_CURE}"
     elif worse:
         note += f"; the next leaves {min(worse) / max(best.stillness.relative, 1e-9):.3g} times as much"
     return note
@@ -193,7 +220,7 @@ def _margin(
 
 def _cause(ranked: Sequence[_Candidate]) -> str:
     """What would make the best readings hold still: another unit, or the other handedness."""
-    for candidate in ranked[:_MOST_EXAMINED]:
+    for candidate in sorted(ranked[:_MOST_EXAMINED], key=lambda c: c.deviations):
         hand, seen = candidate.hand_poses, candidate.target.poses
         mirrored = hand * np.outer(_MIRROR, _MIRROR)
         if stillness(mirrored, seen).relative < _CONVINCING:
@@ -212,34 +239,28 @@ def _cause(ranked: Sequence[_Candidate]) -> str:
 
 
 def _proof(chosen: _Candidate, note: str) -> Proof:
-    return Proof(chosen.mounting, chosen.robot.poses, chosen.target.poses, note)
+    return Proof(chosen.mounting, chosen.robot.poses, chosen.target.poses, note, chosen.robot.text)
 
 
 def _candidates(
     robot: Sequence[Reading], target: Sequence[Reading], mountings: Sequence[Mounting], told: bool
 ) -> Iterator[_Candidate]:
-    """Combinations worth fitting: rotations must turn by the same angles whatever the directions are."""
-    robot_angles = np.array([_turns(reading.poses) for reading in robot])
-    target_angles = np.array([_turns(reading.poses) for reading in target])
-    gaps = np.sqrt(((robot_angles[:, None] - target_angles) ** 2).mean(-1))
-    limit = _CLEARLY_WORSE * gaps.min() + _ANGLE_SLACK_RAD
-    departures = np.add.outer([r.deviations for r in robot], [t.deviations for t in target])
+    """Combinations worth fitting: those whose rotations agree, and the one that is documented."""
+    hands = [(mounting, reading) for reading in robot for mounting in (mountings if told else Mounting)]
+    misfits = rotation_misfits(
+        [_hand(mounting, reading.poses) for mounting, reading in hands], [reading.poses for reading in target]
+    )
+    best = np.sort(misfits, axis=None)[:_MOST_EXAMINED]
+    limit = max(best[-1], min(_CLEARLY_WORSE * best[0], _STILL) + _ROTATION_SLACK)
+    own = [reading.deviations + (mounting not in mountings) for mounting, reading in hands]
+    departures = np.add.outer(own, [reading.deviations for reading in target])
     documented = departures == 0
-    worth = (gaps <= limit) | (documented & (documented.sum() == 1))
-    for i, j in np.argwhere(worth):
-        for mounting in mountings if told else Mounting:
-            hand = _hand(mounting, robot[i].poses)
-            still = stillness(hand, target[j].poses)
-            deviations = int(departures[i, j]) + (mounting not in mountings)
-            yield _Candidate(mounting, robot[i], target[j], deviations, still)
+    too_few = len(robot[0].poses) < _LEAST_SAMPLES
+    for i, j in np.argwhere((misfits <= limit) | (documented & (too_few | (documented.sum() == 1)))):
+        mounting, reading = hands[i]
+        still = stillness(_hand(mounting, reading.poses), target[j].poses)
+        yield _Candidate(mounting, reading, target[j], int(departures[i, j]), still)
 
 
 def _hand(mounting: Mounting, base_T_flange: Array) -> Array:
     return base_T_flange if mounting is Mounting.EYE_TO_HAND else se3.inverse(base_T_flange)
-
-
-def _turns(poses: Array) -> Array:
-    """Angles (N - 1,) rad between neighbouring poses; the inverse poses have the same."""
-    if len(poses) < 2:
-        return np.zeros(1)
-    return np.asarray(se3.rotation_error_rad(poses[:-1], poses[1:]))

@@ -41,7 +41,9 @@ ABB q1 to q4, UR and xArm rx ry rz (xArm also roll pitch yaw). Franka's O_T_EE i
 
 UNITS_M = {"m": 1.0, "cm": 1e-2, "mm": 1e-3}
 _METRES_BELOW = 10.0
-_EITHER_BELOW = 100.0
+_ARMS_CM_BELOW = 300.0
+_SEEN_CM_BELOW = 100.0
+"""Centimetres are as usual as millimetres below: of an arm's reach, and of a target before a camera."""
 _NO_CENTIMETRES_FROM = 1000.0
 _RADIANS_BELOW = 2 * np.pi + 0.1
 
@@ -102,7 +104,7 @@ def readings(
     assumed = (assumed_rotation,) if isinstance(assumed_rotation, str) else tuple(assumed_rotation or names)
     found, faults = [], []
     for position, turn, order in layouts:
-        units = [(unit, 0)] if unit else _units(position)
+        units = [(unit, 0)] if unit else _units(position, frames[0] == "base")
         for name in (rotation,) if rotation else names:
             try:
                 poses = _poses(name, position, turn)
@@ -145,14 +147,13 @@ def _layouts(rows: Array) -> Iterator[tuple[Array, Array, str]]:
         )
 
 
-def _units(position: Array) -> list[tuple[str, int]]:
+def _units(position: Array, of_arm: bool) -> list[tuple[str, int]]:
     """Units that lengths of this magnitude may be in, and how unusual each is."""
     length = float(np.median(np.linalg.norm(position, axis=1)))
     if length < _METRES_BELOW:
         return [("m", 0)]
-    if length < _EITHER_BELOW:
-        return [("mm", 0), ("cm", 0)]
-    return [("mm", 0), ("cm", 1)] if length < _NO_CENTIMETRES_FROM else [("mm", 0)]
+    rare = length >= (_ARMS_CM_BELOW if of_arm else _SEEN_CM_BELOW)
+    return [("mm", 0), ("cm", int(rare))] if length < _NO_CENTIMETRES_FROM else [("mm", 0)]
 
 
 def _poses(name: str, position: Array, turn: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +27,24 @@ class Stillness:
 
     def __str__(self) -> str:
         return f"{self.rotation_deg:.3g} deg, {self.translation_mm:.3g} mm"
+
+
+def rotation_misfits(hands: Sequence[Array], targets: Sequence[Array]) -> Array:
+    """How little the turns of each hand (N, 4, 4) agree with those of each target, (hands, targets), 0 to about 1.
+
+    What Park and Martin's rotation (Arun 1987's solution) leaves of the turns between poses one and two rows apart.
+    """
+    A, B = (np.array([_near_turns(poses) for poses in stream]) for stream in (hands, targets))
+    u, values, v = np.linalg.svd(np.einsum("imk,jml->ijkl", A, B))
+    values[..., 2] *= np.sign(np.linalg.det(u) * np.linalg.det(v))
+    total = (A**2).sum((1, 2))[:, None] + (B**2).sum((1, 2))
+    return np.asarray(np.sqrt(np.maximum(total - 2 * values.sum(-1), 0) / np.maximum(total, 1e-12)))
+
+
+def _near_turns(poses: Array) -> Array:
+    poses = poses[_pairs(len(poses))[0]]
+    inverses = se3.inverse(poses)
+    return np.concatenate([se3.so3_log((poses[k:] @ inverses[:-k])[:, :3, :3]) for k in (1, 2)])
 
 
 def turns_about_one_axis(poses: Array) -> bool:
