@@ -11,9 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hecbench import registry, runner, se3
+from hecbench import registry, se3
 from hecbench.estimate import Status
 from hecbench.recording import Mounting, Recording
+from hecbench.running import runner, solving
 from hecbench.specs import Kind, SolverSpec
 
 CLOSED_FORMS = ("andreff", "daniilidis", "horaud", "li", "park", "shah", "tsai")
@@ -51,7 +52,7 @@ def test_exact_data_on_1000_rigs(benchmark):
         return [
             estimate
             for i in range(1000)
-            for estimate in runner.solve(
+            for estimate in solving.solve(
                 exact_recording(rng, list(Mounting)[i % 2], rng.integers(5, 21), rng.uniform(20, 180)),
                 specs(),
             )
@@ -105,7 +106,7 @@ def test_start_up(benchmark):
 def test_rate_of_10000_recordings(jobs, benchmark, tmp_path):
     """Generated recordings through PnP, seven solvers, rulers and the store."""
     tasks = [runner.Task(CLOSED_FORMS, suite="markers", level="tag_2m", index=i) for i in range(10_000)]
-    options = runner.Options(stop_on_bad_input=False)
+    options = solving.Options(stop_on_bad_input=False)
     start = time.perf_counter()
     contents = benchmark.pedantic(
         lambda: runner.run(tasks, options, out=tmp_path / "run", jobs=jobs), rounds=1

@@ -59,7 +59,7 @@ def test_bench_seconds_per_thousand_iterations(name):
 def test_bench_guess_free_start():
     """The hemisphere of easyhecpp: seconds, and the overlap of drawing and mask that it finds."""
     from hecbench_plugins.first_order.hemisphere import best_on_hemisphere
-    from hecbench_plugins.render_views import prepare
+    from hecbench_plugins.views.pyramid import prepare
 
     seconds, overlaps = [], []
     for index in range(max(3, round(20 * SCALE))):

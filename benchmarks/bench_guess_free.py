@@ -12,11 +12,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hecbench_datasets import guess_free
-from hecbench_plugins.guess_free import GuessFree
+from hecbench_plugins.solvers.render_gn_free import render_gn_free
 
 from hecbench import se3, statistics
 from hecbench.errors import Refusal, SolverFailure
-from hecbench.recording_io import load
+from hecbench.storage.recording_io import load
 
 SCALE = float(os.environ.get("HECBENCH_BENCH_SCALE", "1"))
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
@@ -25,7 +25,7 @@ SUCCESS_M, SUCCESS_RAD = 0.005, 0.01
 
 def run(recordings):
     """Success, translation m and seconds of each; prints every one that is not within the bounds."""
-    solver, good, off_m, seconds = GuessFree(), [], [], []
+    solver, good, off_m, seconds = render_gn_free(), [], [], []
     for recording in recordings:
         truth = recording.truth_parent_T_camera
         blind = replace(recording.without_truth(), initial_parent_T_camera=None)

@@ -19,9 +19,10 @@ from pathlib import Path
 import numpy as np
 from hecbench_datasets import kinhec
 
-from hecbench import registry, runner, se3
+from hecbench import registry, se3
 from hecbench.errors import InputError
 from hecbench.recording import Mounting
+from hecbench.running import solving
 from hecbench.specs import Kind, SolverSpec
 
 SOLVERS = ("andreff", "daniilidis", "horaud", "li", "park", "shah", "single3d_iterative", "tsai")
@@ -49,7 +50,7 @@ def errors_of_X(recording, estimate, X_true):
     if X_est is None:
         return np.inf, np.inf
     if recording.mounting is Mounting.EYE_TO_HAND:
-        X_est = estimate.other_T_target
+        X_est = estimate.carrier_T_target
         if X_est is None:
             flange_T_base = se3.inverse(recording.base_T_flange)
             X_est = se3.mean(flange_T_base @ estimate.parent_T_camera @ recording.camera_T_target)
@@ -71,7 +72,7 @@ def ours(root, names):
             print(error, file=sys.stderr)
             continue
         recording = recording.subset(keyframes(recording.base_T_flange))
-        for estimate in runner.solve(recording, specs, runner.Options(held_out=False)):
+        for estimate in solving.solve(recording, specs, solving.Options(held_out=False)):
             found[f"hecbench {estimate.solver}", track].append(errors_of_X(recording, estimate, X_true))
     return found
 

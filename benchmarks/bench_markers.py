@@ -16,15 +16,15 @@ import numpy as np
 from hecbench_datasets.synthetic_faults import FAULTS, arm_recording
 from hecbench_datasets.synthetic_markers import PRESETS, generate, make
 from hecbench_plugins.evaluators.truth import target_registration_error_m
-from hecbench_plugins.reprojection import corner_problem
+from hecbench_plugins.markers.reprojection import corner_problem
 from hecbench_plugins.solvers.bundle import Bundle
 
-from hecbench import registry, runner, se3
-from hecbench.bundle_adjustment import adjust
-from hecbench.bundle_model import Noise, State, predict
+from hecbench import preparation, registry, se3
+from hecbench.bundle.adjustment import adjust
+from hecbench.bundle.model import Noise, State, predict
 from hecbench.diagnose import Severity, check
 from hecbench.errors import HecbenchError
-from hecbench.robot import load_robot
+from hecbench.robots.model import load_robot
 from hecbench.specs import Kind, SolverSpec
 from hecbench.targets import ChessboardTarget
 
@@ -59,7 +59,7 @@ def cramer_rao_covariance(level, recording):
     problem = corner_problem(recording.without_truth())
     answer = known_bundle(level)(recording.without_truth(), rng=np.random.default_rng(0))
     X = recording.truth_parent_T_camera
-    state = State(X, answer.other_T_target, problem.base_T_flange, problem.parameters)
+    state = State(X, answer.carrier_T_target, problem.base_T_flange, problem.parameters)
     expected, _, _ = predict(problem, state)
     without_residuals = replace(problem, observed=np.where(problem.seen[..., None], expected, np.nan))
     return adjust(without_residuals, state, noise).covariance[:6, :6]
@@ -139,7 +139,7 @@ def check_recall(rigs):
     for recordings in (good, [("arm", i) for i in range(rigs)], [("small_tag_2m", i) for i in range(rigs)]):
         alarms = Counter()
         for kind, index in recordings:
-            found = {(f.id, f.severity) for f in check(good_recording(kind, index, robot), runner.prepare)}
+            found = {(f.id, f.severity) for f in check(good_recording(kind, index, robot))}
             alarms.update(f"{i} {s}" for i, s in found if s in (Severity.WARNING, Severity.CRITICAL))
             alarms["any critical"] += any(s is Severity.CRITICAL for _, s in found)
         print(f"{len(recordings)} good recordings ({recordings[0][0]} ...): {dict(alarms)}", flush=True)
@@ -149,9 +149,9 @@ def check_recall(rigs):
         for kind, index in recordings:
             recording = good_recording(kind, index, robot)
             if fault.needs_target_poses:
-                recording = runner.prepare(recording)
+                recording = preparation.prepare(recording)
             faulty = fault.seed(recording, np.random.default_rng([11, index]))
-            ids = {f.id for f in check(faulty, runner.prepare) if f.severity is Severity.CRITICAL}
+            ids = {f.id for f in check(faulty) if f.severity is Severity.CRITICAL}
             hits += fault.finding in ids
             besides.update(ids - {fault.finding})
         share = 100 * hits / len(recordings)

@@ -11,9 +11,10 @@ import numpy as np
 import pytest
 from hecbench_datasets import maskless as suites
 
-from hecbench import registry, runner
+from hecbench import registry
 from hecbench.errors import InputError
 from hecbench.estimate import Status
+from hecbench.running import solving
 from hecbench.specs import Kind, SolverSpec
 
 SCALE = float(os.environ.get("HECBENCH_BENCH_SCALE", "1"))
@@ -45,7 +46,7 @@ def test_bench_photographs(benchmark, suite, level, solver, full, bar):
 
     def campaign():
         recordings = (suites.make(suite, level, index, 0) for index in range(count))
-        return [estimate for recording in recordings for estimate in runner.solve(recording, [spec])]
+        return [estimate for recording in recordings for estimate in solving.solve(recording, [spec])]
 
     estimates = benchmark.pedantic(campaign, rounds=1)
     errors = [e.errors for e in estimates if e.status is Status.OK]

@@ -10,7 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hecbench_datasets import guess_free, synthetic
-from hecbench_plugins.render_gn import RenderGN
+from hecbench_plugins.solvers.render_gn import render_gn
 from scipy import ndimage
 
 from hecbench import next_view, se3, statistics
@@ -60,7 +60,7 @@ def one_scene(index, noise_px):
 
     def solved(joints):
         try:
-            return RenderGN()(recording(scene, joints, noise_px).without_truth(), rng=rng).parent_T_camera
+            return render_gn()(recording(scene, joints, noise_px).without_truth(), rng=rng).parent_T_camera
         except (Refusal, SolverFailure) as reason:
             print(f"scene {index}, {len(joints)} views: {reason}")
             return None

@@ -15,9 +15,9 @@ from pathlib import Path
 import cv2
 import numpy as np
 from hecbench_plugins.detection import detect
-from hecbench_plugins.target_poses import project, target_poses
+from hecbench_plugins.markers.target_poses import project, target_poses
 
-from hecbench import runner, se3
+from hecbench import preparation, se3
 from hecbench.recording import CameraModel
 
 TUTORIAL = CameraModel(
@@ -73,7 +73,7 @@ def main(data):
     print("| set | samples | Park deg / mm | reference | Daniilidis deg / mm | rms px |")
     print("|---|---|---|---|---|---|")
     for name, (folder, detector, reference) in SETS.items():
-        recording = runner.load_recording(data / folder)
+        recording = preparation.load_recording(data / folder)
         recording = detector(recording) if detector else recording
         park, daniilidis = (
             "{:.2f} / {:.2f}".format(*spread(recording, method))

@@ -12,15 +12,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from hecbench_datasets import synthetic
-from hecbench_plugins import render_stages
-from hecbench_plugins.render_gn import RenderGN
-from hecbench_plugins.render_views import prepare
+from hecbench_plugins.second_order.descent import Trace
+from hecbench_plugins.second_order.photometry import Photometry
+from hecbench_plugins.solvers.render_gn import render_gn
+from hecbench_plugins.views.pyramid import prepare
 
 from hecbench import se3
 from hecbench.errors import SolverFailure
-from hecbench.recording_io import load
 from hecbench.rendering import Renderer, RenderMesh
-from hecbench.robot import load_robot
+from hecbench.robots.model import load_robot
+from hecbench.storage.recording_io import load
 
 SCALE = float(os.environ.get("HECBENCH_BENCH_SCALE", "1"))
 SHARED = Path(__file__).resolve().parents[2] / "shared" / "data"
@@ -160,7 +161,7 @@ def errors(estimate, recording):
 
 def solve_level(level, samples):
     """Errors of every run, NaN where it failed, and the median seconds."""
-    solver, rows, seconds = RenderGN(), [], []
+    solver, rows, seconds = render_gn(), [], []
     for index in range(samples):
         recording = synthetic.make(level, index, 0)
         start = time.perf_counter()
@@ -205,7 +206,7 @@ def test_bench_appearance(benchmark, level):
 
 def test_bench_noise_against_the_cramer_rao_bound(benchmark):
     """Noise 0.05, no mask: rms error 1.2 times the bound, the 95 % ellipsoids hold 93 to 97 %."""
-    solver, by_bound, by_estimate = RenderGN(), [], []
+    solver, by_bound, by_estimate = render_gn(), [], []
 
     def trials():
         for index in range(count(1000)):
@@ -216,7 +217,7 @@ def test_bench_noise_against_the_cramer_rao_bound(benchmark):
             estimate = solver(blind, rng=rng)
             truth = recording.truth_parent_T_camera
             _, views = prepare(recording)
-            exact = render_stages.Photometry(views, 1, slice(0, 3), np.inf, render_stages.Trace())
+            exact = Photometry(views, 1, slice(0, 3), np.inf, Trace())
             information = exact(se3.inverse(truth))[1]
             twist = se3.log(truth @ se3.inverse(estimate.parent_T_camera))
             local = np.linalg.solve(se3.adjoint(truth), twist)
@@ -235,7 +236,7 @@ def test_bench_pictures_of_another_renderer(benchmark):
     """The lit recordings, given masks, from their starts: single views 1.0 mm, five views 0.4 mm."""
     if not SHARED.is_dir():
         pytest.skip("the lit recordings are not beside this checkout")
-    solver, single, joint = RenderGN(), [], []
+    solver, single, joint = render_gn(), [], []
 
     def trials():
         for path in sorted(SHARED.glob("lit_ur5e_1_*")):

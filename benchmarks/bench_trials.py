@@ -21,9 +21,11 @@ from hecbench_hardware.trials.calibrations import predicted
 from hecbench_hardware.trials.cell import Calibration
 from hecbench_hardware.trials.tasks import Task
 
-from hecbench import registry, runner, se3, store
+from hecbench import preparation, registry, se3
 from hecbench.recording import Recording
+from hecbench.running import solving
 from hecbench.specs import Kind, SolverSpec
+from hecbench.storage import store
 from hecbench.targets import AprilTagTarget
 
 GRIPPER = solids.GRIPPERS["robotiq_2f_85"]
@@ -106,9 +108,9 @@ def conditions(seed: int = 0) -> None:
         for number in range(station.calibrations):
             how = MarkerSet(tag_m=tag_m, spread_deg=spread_deg, box_m=0.3 if spread_deg > 10 else 0.15)
             recording = noisy(station, number, how, *noise, seed)
-            offered = runner.prepare(recording).offers()
+            offered = preparation.prepare(recording).offers()
             able = [spec for spec in specs if spec.needs <= offered]
-            for answer in runner.solve(recording, able, runner.Options(seed=seed, held_out=False)):
+            for answer in solving.solve(recording, able, solving.Options(seed=seed, held_out=False)):
                 rates.setdefault(answer.solver, []).extend(
                     _predictions(station, number, answer.parent_T_camera)
                 )
@@ -172,8 +174,8 @@ def vs060(urdf: str, out: Path) -> None:
     with store.writing(out, resume=False) as writer:
         for number in range(station.calibrations):
             recording = recordings.marker_recording(number, station=station)
-            able = [spec for spec in specs if spec.needs <= runner.prepare(recording).offers()]
-            answers = runner.solve(recording, able)
+            able = [spec for spec in specs if spec.needs <= preparation.prepare(recording).offers()]
+            answers = solving.solve(recording, able)
             writer.append(
                 replace(answer, suite="lab", level="vs060", item=f"{number:06d}") for answer in answers
             )

@@ -48,7 +48,7 @@ class Estimate:
 
     Attributes:
         parent_T_camera: (4, 4) m; parent = base (eye_to_hand) or flange (eye_in_hand). None unless ok.
-        other_T_target: (4, 4) m, flange_T_target or base_T_target, when the method gives it.
+        carrier_T_target: (4, 4) m, flange_T_target or base_T_target, when the method gives it.
         covariance: (6, 6) of [phi rad, rho m] in ``X_true = exp([phi, rho]) @ X_est``, or None.
         termination: why the computation ended.
         iterations: of the main loop; 0 for closed forms.
@@ -59,7 +59,7 @@ class Estimate:
     """
 
     parent_T_camera: Array | None = None
-    other_T_target: Array | None = None
+    carrier_T_target: Array | None = None
     covariance: Array | None = None
     termination: Termination = Termination.CLOSED_FORM
     iterations: int = 0
@@ -87,7 +87,7 @@ class Estimate:
             raise InputError(f"estimate: status '{self.status}' with parent_T_camera {self.parent_T_camera}")
         if self.status is not Status.OK and not self.reason:
             raise InputError(f"estimate: status '{self.status}' needs a reason")
-        for name in ("parent_T_camera", "other_T_target"):
+        for name in ("parent_T_camera", "carrier_T_target"):
             if (pose := getattr(self, name)) is not None:
                 pose = np.asarray(pose, float)
                 if pose.shape != (4, 4) or not se3.is_transform(pose):
@@ -112,7 +112,7 @@ class Estimate:
             "status": self.status,
             "reason": self.reason,
             "parent_T_camera": self.parent_T_camera,
-            "other_T_target": self.other_T_target,
+            "carrier_T_target": self.carrier_T_target,
             "covariance": self.covariance,
             "termination": self.termination,
             "iterations": self.iterations,
@@ -178,7 +178,8 @@ class _EstimateJson(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     camera: _CameraJson | None = None
     reason: str | None = None
     parent_T_camera: list[list[float]] | None = None
-    other_T_target: list[list[float]] | None = None
+    carrier_T_target: list[list[float]] | None = None
+    other_T_target: list[list[float]] | None = None  # carrier_T_target in files of version 0.1
     covariance: list[list[float]] | None = None
     termination: Termination = Termination.CLOSED_FORM
     iterations: int = 0
@@ -194,6 +195,7 @@ class _EstimateJson(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
     level: str | None = None
 
 
+_NOT_VALUES = ("schema", "other_T_target")
 _DECODER = msgspec.json.Decoder(_EstimateJson)
 
 
@@ -205,7 +207,8 @@ def decode(content: bytes, source: str) -> Estimate:
     """
     try:
         parsed = _DECODER.decode(content)
-        values = {name: getattr(parsed, name) for name in parsed.__struct_fields__ if name != "schema"}
+        values = {name: getattr(parsed, name) for name in parsed.__struct_fields__ if name not in _NOT_VALUES}
+        values["carrier_T_target"] = parsed.carrier_T_target or parsed.other_T_target
         if parsed.camera:
             K = parsed.camera.K
             distortion = np.array(parsed.camera.distortion, float)

@@ -19,7 +19,8 @@ from hecbench.errors import InputError
 from hecbench.estimate import Estimate
 from hecbench.recording import Recording
 from hecbench.rendering import Renderer, RenderMesh
-from hecbench.robot import load_robot
+from hecbench.rendering.undistort import shrunk_intrinsics
+from hecbench.robots.posed import PosedRobot
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -42,7 +43,7 @@ _PRIOR_RAD, _PRIOR_M = 0.2, 0.2
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
+class ViewInformation:
     """What one joint vector would show.
 
     Attributes:
@@ -66,31 +67,25 @@ class RobotView:
     """
 
     def __init__(self, recording: Recording) -> None:
-        robot, camera = recording.robot, recording.camera
-        if robot is None or not (robot.model or robot.urdf):
-            raise InputError(
-                f"{recording.name}: robot.model or robot.urdf is needed to plan views of the robot"
-            )
+        camera, self._robot = recording.camera, PosedRobot.of(recording)
         if camera is None or camera.K is None:
             raise InputError(f"{recording.name}: camera.K is needed to plan views of the robot")
-        self._model = load_robot(robot.urdf or str(robot.model))
-        self._names = robot.joint_names or self._model.joint_names
-        self._parent = recording.parent_link
         size = camera.width, camera.height
-        coarse = RenderMesh.of(self._model, cell_m=_COARSE_CELL_M)
-        self._near = Renderer(RenderMesh.of(self._model, cell_m=_CELL_M), *_sized(camera.K, size, 1, _SHRINK))
+        coarse = RenderMesh.of(self._robot.model, cell_m=_COARSE_CELL_M)
+        self._near = Renderer(
+            RenderMesh.of(self._robot.model, cell_m=_CELL_M), *_sized(camera.K, size, 1, _SHRINK)
+        )
         self._wide = Renderer(coarse, *_sized(camera.K, size, _CANVAS, _COARSE_SHRINK))
         self._small = Renderer(coarse, *_sized(camera.K, size, 1, _COARSE_SHRINK))
 
     @property
     def limits_rad(self) -> Array:
         """(J, 2) of the model's joints."""
-        return self._model.limits(self._names)
+        return self._robot.model.limits(self._robot.joint_names)
 
-    def look(self, joints_rad: ArrayLike, parent_T_camera: Array) -> Look:
+    def look(self, joints_rad: ArrayLike, parent_T_camera: Array) -> ViewInformation:
         """What these joints (J,) would show to a camera."""
-        links = self._model.link_poses(joints_rad, self._names, frame=self._parent)
-        poses = se3.inverse(parent_T_camera) @ links
+        poses = se3.inverse(parent_T_camera) @ self._robot.link_poses(np.asarray(joints_rad, float))
         self._wide.rasterise(poses)
         drawn = self._wide.face >= 0
         height, width = drawn.shape
@@ -100,11 +95,11 @@ class RobotView:
         in_view = 0.0 if hidden else float(inside.sum() / drawn.sum())
         self._near.draw(poses)
         filled = float((self._near.face >= 0).mean())
-        return Look(*contour_information(self._near, _SHRINK), in_view, filled)
+        return ViewInformation(*contour_information(self._near, _SHRINK), in_view, filled)
 
     def masks(self, joints_rad: ArrayLike, cameras: Array) -> Mask:
         """Where (K, h, w) the robot would be drawn by cameras parent_T_camera (K, 4, 4), an eighth of the size."""
-        parent_T_link = self._model.link_poses(joints_rad, self._names, frame=self._parent)
+        parent_T_link = self._robot.link_poses(np.asarray(joints_rad, float))
         found = np.empty((len(cameras), *self._small.face.shape), bool)
         for camera_T_parent, mask in zip(se3.inverse(cameras), found, strict=True):
             self._small.rasterise(camera_T_parent @ parent_T_link)
@@ -115,9 +110,7 @@ class RobotView:
 def _sized(K: Array, size: tuple[int, int], canvas: int, shrink: int) -> tuple[Array, int, int]:
     """K, width and height of a canvas about the image, shrunk."""
     width, height = (canvas * (side // shrink) for side in size)
-    small = K.copy()
-    small[:2] /= shrink
-    small[:2, 2] += 0.5 / shrink - 0.5
+    small = shrunk_intrinsics(K, 1 / shrink)
     small[:2, 2] += [(canvas - 1) * (side // shrink) / 2 for side in size]
     return small, width, height
 
@@ -156,7 +149,7 @@ def prior_information() -> Array:
     return np.diag([_PRIOR_RAD**-2.0] * 3 + [_PRIOR_M**-2.0] * 3)
 
 
-def log_determinants(known: Array, looks: Sequence[Look]) -> Array:
+def log_determinants(known: Array, looks: Sequence[ViewInformation]) -> Array:
     """log det (M,) of what would be known after each look, nats: the D-optimal criterion."""
     return np.asarray(np.linalg.slogdet(known + np.array([look.information for look in looks]))[1])
 
@@ -174,7 +167,7 @@ def expected_error_m(known: Array, parent_T_camera: Array, points_m: Array) -> f
 
 
 def possible_cameras(
-    known: Array, parent_T_camera: Array, look: Look, count: int, rng: np.random.Generator
+    known: Array, parent_T_camera: Array, look: ViewInformation, count: int, rng: np.random.Generator
 ) -> Array:
     """Cameras (count, 4, 4) drawn from what is known about one, spread so that they can be told apart in a mask.
 
@@ -201,7 +194,7 @@ class Visible:
     least_in_view: float = 0.6
     least_filled: float = 0.01
 
-    def __call__(self, look: Look) -> bool:
+    def __call__(self, look: ViewInformation) -> bool:
         return look.in_view >= self.least_in_view and look.filled >= self.least_filled
 
 
@@ -274,7 +267,7 @@ def most_uncertain(
 
 def _seen(
     view: RobotView, parent_T_camera: Array, candidates_rad: Array, count: int, visible: Visible
-) -> dict[int, Look]:
+) -> dict[int, ViewInformation]:
     looks = {i: view.look(joints, parent_T_camera) for i, joints in enumerate(candidates_rad)}
     seen = {i: look for i, look in looks.items() if visible(look)}
     if len(seen) < count:
@@ -287,7 +280,7 @@ def _seen(
 
 def _one_by_one(
     best: Callable[[Array, list[int]], int],
-    looks: Mapping[int, Look],
+    looks: Mapping[int, ViewInformation],
     candidates_rad: Array,
     known: Array,
     count: int,

@@ -1,11 +1,12 @@
 """Discovery of plugins. Broken, conflicting and not-ready plugins are data to be listed, never crashes.
 
-An entry point of group ``hecbench`` names a module with hooks, or a package whose ``plugin_modules`` lists
-modules with hooks. Every module is imported inside its own ``try``, so one bad file costs one plugin.
+An entry point of group ``hecbench`` names a module with hooks, or a package whose ``plugin_folders`` names folders of
+such modules. Every module is imported inside its own ``try``, so one bad file costs one plugin.
 """
 
 from __future__ import annotations
 
+import pkgutil
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
@@ -14,7 +15,7 @@ from functools import cache
 from importlib import import_module, metadata
 from importlib.util import find_spec
 from types import ModuleType
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import pluggy
 
@@ -103,6 +104,17 @@ class Registry:
             raise InputError(f"{kind} '{plain}' is {plugin.status}: {plugin.detail}")
         return plugin.spec.configured(settings) if isinstance(plugin.spec, SolverSpec) else plugin.spec
 
+    def named(self, name: str, kind: str | None = None) -> AnySpec:
+        """The ready spec of that name, of any kind; an `InputError` when plugins of several kinds have the name."""
+        if kind is not None and kind not in list(Kind):
+            raise InputError(f"--kind {kind}: choose one of {', '.join(Kind)}")
+        plain = name.partition("[")[0]
+        kinds = [plugin.kind for plugin in self.plugins if plugin.name == plain and plugin.kind is not None]
+        if kind is None and len(set(kinds)) > 1:
+            raise InputError(f"'{plain}' is a {' and a '.join(kinds)}: name one with --kind")
+        wanted = Kind(kind) if kind is not None else next(iter(kinds), Kind.SOLVER)
+        return cast("AnySpec", self.get(wanted, name, Spec))
+
 
 def _settings(name: str) -> tuple[str, dict[str, str]]:
     """A solver's name and the options set in it: ``name[option=value,...]``."""
@@ -146,7 +158,7 @@ def _plugins_of(entry_point: metadata.EntryPoint, observers: dict[str, TrialObse
     except Exception as error:  # a stranger's module may raise anything at import
         yield broken(entry_point.name, error)
         return
-    for module_name in getattr(target, "plugin_modules", (target.__name__,)):
+    for module_name in _module_names(target):
         try:
             specs, observer = _implemented(import_module(module_name))
         except Exception as error:  # likewise
@@ -157,6 +169,18 @@ def _plugins_of(entry_point: metadata.EntryPoint, observers: dict[str, TrialObse
         for spec in specs:
             status, detail = _readiness(spec)
             yield Plugin(spec.name, spec.kind, status, distribution, version, detail, spec)
+
+
+def _module_names(target: ModuleType) -> Iterator[str]:
+    """The modules with hooks: those of `plugin_folders` ("." is the package itself), or the target alone."""
+    folders = getattr(target, "plugin_folders", None)
+    if folders is None:
+        yield target.__name__
+        return
+    for folder in folders:
+        package = target if folder == "." else import_module(f"{target.__name__}.{folder}")
+        found = pkgutil.iter_modules(package.__path__, prefix=f"{package.__name__}.")
+        yield from (module.name for module in found if not module.ispkg)
 
 
 def _implemented(module: ModuleType) -> tuple[list[AnySpec], TrialObserver | None]:

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench.errors import InputError
-from hecbench.needs import Need as Need
+from hecbench.recording import Need as Need
 
 if TYPE_CHECKING:
     from hecbench.estimate import Estimate
@@ -168,7 +168,7 @@ class Evaluator(Protocol):
     ) -> Mapping[str, Any]: ...
 
 
-class Into(StrEnum):
+class ResultSection(StrEnum):
     """Where a ruler's numbers go, and when it is applied."""
 
     ERRORS = "errors"
@@ -186,7 +186,7 @@ class EvaluatorSpec(Spec):
     kind: ClassVar[Kind] = Kind.EVALUATOR
     columns: tuple[Column, ...]
     factory: Callable[[], Evaluator]
-    into: Into
+    into: ResultSection
     applies: Callable[[Recording], bool]
 
 

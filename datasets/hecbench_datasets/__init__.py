@@ -1,6 +1,4 @@
 """Recordings: one file per format or generator."""
 
-from hecbench.modules import submodules
-
-plugin_modules = submodules(__name__)
-"""Modules whose hooks belong to this package, imported one by one when plugins are listed."""
+plugin_folders = (".",)
+"""Folders whose modules are plugins, imported one by one when plugins are listed."""

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from hecbench import se3
-from hecbench.conventions import HINTS_NAME
 from hecbench.errors import InputError
+from hecbench.exchange.conventions import HINTS_NAME
 from hecbench.recording import Mounting, Recording, RobotDescription
 from hecbench.registry import hookimpl
 from hecbench.specs import DatasetSpec

@@ -1,10 +1,10 @@
-"""The exporters of the project; the writing is done in `hecbench.export`."""
+"""The exporters of the project; the writing is done in `hecbench.exchange.export`."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
-from hecbench import export
+from hecbench.exchange import export
 from hecbench.registry import hookimpl
 from hecbench.specs import ExporterSpec
 

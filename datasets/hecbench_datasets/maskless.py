@@ -24,11 +24,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import recording_io, se3
+from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import SuiteSpec
+from hecbench.storage import recording_io
 
 VARIABLE = "HECBENCH_RECORDINGS"
 REAL, OTHER_CAMERA = "ur3e_cam1", "ur3e_cam3"

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from hecbench import recording_io
 from hecbench.registry import hookimpl
 from hecbench.specs import DatasetSpec
+from hecbench.storage import recording_io
 
 
 @hookimpl

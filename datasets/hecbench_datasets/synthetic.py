@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from hecbench import se3
 from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
 from hecbench.registry import hookimpl
-from hecbench.robot import RobotModel, load_robot
+from hecbench.robots.model import RobotModel, load_robot
 from hecbench.specs import SuiteSpec
 
 if TYPE_CHECKING:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
-from hecbench.robot import RobotModel
+from hecbench.robots.model import RobotModel
 from hecbench.targets import AprilTagTarget, ChessboardTarget, Target
 
 Array = NDArray[np.float64]
@@ -35,8 +35,8 @@ def arm_recording(robot: RobotModel, rng: np.random.Generator, samples: int = 12
 
     joints_rad = _HOME_RAD + rng.uniform(-1.0, 1.0, (samples, 6)) * _JOINT_SPREAD_RAD
     base_T_flange = robot.forward(joints_rad, base="base", tip="tool0")
-    other_T_target = se3.make(Rotation.random(random_state=rng).as_matrix(), [0.0, 0.0, 0.05])
-    base_T_target = base_T_flange @ other_T_target
+    carrier_T_target = se3.make(Rotation.random(random_state=rng).as_matrix(), [0.0, 0.0, 0.05])
+    base_T_target = base_T_flange @ carrier_T_target
     facing = base_T_target[0, :3, :3] @ se3.so3_exp(rng.uniform(-0.3, 0.3, 3))
     base_T_camera = se3.make(facing, base_T_target[:, :3, 3].mean(0) - _DISTANCE_M * facing[:, 2])
     K = np.array([[_FOCAL_PX, 0, (_WIDTH - 1) / 2], [0, _FOCAL_PX, (_HEIGHT - 1) / 2], [0, 0, 1]])
@@ -137,8 +137,8 @@ def _replaced_rotations(recording: Recording, rotvecs: Array, rng: np.random.Gen
     assert X is not None
     positions = rng.uniform([-0.2, -0.2, 1.8], [0.2, 0.2, 2.2], hand_noise)
     camera_T_target = se3.from_rotvec(rotvecs, positions)
-    other_T_target = se3.make(Rotation.random(random_state=rng).as_matrix(), [0.0, 0.0, 0.05])
-    hand = X @ camera_T_target @ se3.inverse(other_T_target)
+    carrier_T_target = se3.make(Rotation.random(random_state=rng).as_matrix(), [0.0, 0.0, 0.05])
+    hand = X @ camera_T_target @ se3.inverse(carrier_T_target)
     noise = se3.from_rotvec(np.deg2rad(rng.normal(0, 0.05, hand_noise)), rng.normal(0, 5e-4, hand_noise))
     poses = hand if recording.mounting is Mounting.EYE_TO_HAND else se3.inverse(hand)
     corners_px = _corners(recording, camera_T_target, rng)

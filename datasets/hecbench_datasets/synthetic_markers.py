@@ -8,7 +8,7 @@ the base from
    `distance_m`, azimuth uniform within 60 deg of the base's x axis, elevation uniform in 0 to 45 deg, image x
    axis horizontal, then rolled about its view axis uniformly by up to 30 deg. eye_in_hand: uniform random
    rotation, each translation coordinate uniform within 0.1 m.
-3. Y = other_T_target. eye_to_hand: uniform random rotation, translation `tag_offset_m` in the flange frame.
+3. Y = carrier_T_target. eye_to_hand: uniform random rotation, translation `tag_offset_m` in the flange frame.
    eye_in_hand: uniform random rotation, translation (0.5, 0, 0.3) m.
 4. For each sample, camera_T_target: a rotation vector with coordinates uniform within `rotation_deg`, and the
    translation (0, 0, `distance_m`) plus an offset uniform in a cube of side `box_m`, camera axes. At zero
@@ -93,15 +93,15 @@ def generate(setting: MarkerSetting, rng: np.random.Generator, name: str = "synt
     eye_to_hand = setting.mounting is Mounting.EYE_TO_HAND
     if eye_to_hand:
         parent_T_camera = _camera_looking_at_workspace(setting.distance_m, rng)
-        other_T_target = se3.make(_random_rotation(rng), setting.tag_offset_m)
+        carrier_T_target = se3.make(_random_rotation(rng), setting.tag_offset_m)
     else:
         parent_T_camera = se3.make(_random_rotation(rng), rng.uniform(-0.1, 0.1, 3))
-        other_T_target = se3.make(_random_rotation(rng), WORKSPACE_CENTRE_M)
+        carrier_T_target = se3.make(_random_rotation(rng), WORKSPACE_CENTRE_M)
 
     rotvecs = np.deg2rad(rng.uniform(-setting.rotation_deg, setting.rotation_deg, (setting.samples, 3)))
     offsets = rng.uniform(-setting.box_m / 2, setting.box_m / 2, (setting.samples, 3))
     camera_T_target = se3.from_rotvec(rotvecs, np.add(offsets, [0.0, 0.0, setting.distance_m]))
-    hand = parent_T_camera @ camera_T_target @ se3.inverse(other_T_target)
+    hand = parent_T_camera @ camera_T_target @ se3.inverse(carrier_T_target)
     base_T_flange = hand if eye_to_hand else se3.inverse(hand)
 
     points_camera = se3.transform_points(camera_T_target, setting.target.points_m)

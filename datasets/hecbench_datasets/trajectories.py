@@ -14,8 +14,8 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from hecbench.conventions import HINTS_NAME
 from hecbench.errors import InputError
+from hecbench.exchange.conventions import HINTS_NAME
 from hecbench.recording import Mounting, Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import DatasetSpec

@@ -13,9 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from hecbench.conventions import HINTS_NAME
 from hecbench.errors import InputError
-from hecbench.pose_numbers import readings
+from hecbench.exchange.conventions import HINTS_NAME
+from hecbench.exchange.pose_numbers import readings
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import DatasetSpec

@@ -1,10 +1,4 @@
 """Robots, grippers, cameras, the simulated controller and the virtual lab."""
 
-from hecbench.modules import submodules
-
-plugin_modules = (
-    *submodules(__name__, "robots"),
-    *submodules(__name__, "grippers"),
-    *submodules(__name__, "cameras"),
-)
-"""Modules whose hooks belong to this package, imported one by one when plugins are listed."""
+plugin_folders = ("robots", "grippers", "cameras")
+"""Folders whose modules are plugins, imported one by one when plugins are listed."""

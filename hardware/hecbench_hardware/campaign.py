@@ -20,9 +20,9 @@ from typing import Any
 
 import numpy as np
 
-from hecbench import recording_io
 from hecbench.errors import HecbenchError, InputError
 from hecbench.recording import CameraModel, Mounting, Recording
+from hecbench.storage import recording_io
 from hecbench_hardware.cameras.images import ImageFolder
 from hecbench_hardware.controller_sim.process import SimulatedController
 from hecbench_hardware.devices import DeviceFault
@@ -138,6 +138,7 @@ def _freedrive(trial: _Trial, robot: UrRobot) -> None:
 def _grip(trial: _Trial, robot: UrRobot) -> None:
     gripper = RobotiqGripper(robot.host, timeout_s=_GRIPPER_S)
     try:
+        gripper.enable()
         for _ in range(3):
             gripper.open_fingers()
             gripper.close_fingers()

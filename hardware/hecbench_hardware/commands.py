@@ -58,7 +58,7 @@ def controller(host: str, model: str, time_scale: float) -> None:
     "--frames", type=click.IntRange(min=1), default=1, show_default=True, help="Averaged per sample."
 )
 @click.option("--dry-run", is_flag=True, help="Check the plan and drive it on a simulated controller only.")
-@click.option("--yes", is_flag=True, help="Answer every question with yes.")
+@click.option("--yes", is_flag=True, help="Answer the question before the first motion with yes.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else.")
 def record(
@@ -84,9 +84,9 @@ def record(
     CELL describes camera, target and mounting. Its samples are the plan, or with --poses the first one is the
     start of a planned one, or with --freedrive they are not used. The checked plan is written to OUT/plan.json.
     """
-    from hecbench import recording_io
     from hecbench.specs import Kind
-    from hecbench_hardware.arming import take_control
+    from hecbench.storage import recording_io
+    from hecbench_hardware.arming import Operator, take_control
     from hecbench_hardware.devices import FollowsRobot, KnowsTruth
     from hecbench_hardware.recorder.record import Recorder
 
@@ -114,14 +114,15 @@ def record(
             click.echo(f"{out}/plan.json: {what}", err=True)
             if dry_run:
                 return
-        take_control(device, what, armed=arm, confirm=lambda line: yes or click.confirm(line, err=True))
+        operator = Operator(device, yes)
+        take_control(device, what, armed=arm, confirm=operator.confirm)
         recorder = Recorder(
             device,
             eye,
             plan,
             out,
             frames=frames,
-            acknowledge=lambda line: _acknowledged(line, yes or device.simulated),
+            acknowledge=operator.acknowledge,
             report=lambda line: click.echo(line, err=True),
         )
         recording = recorder.follow_hand(_more) if freedrive else recorder.drive()
@@ -187,11 +188,6 @@ def _checked(
     return cell, f"{len(steps)} motions, about {sum(step.expected_s for step in steps):.0f} s"
 
 
-def _acknowledged(line: str, at_once: bool) -> bool:
-    click.echo(line, err=True)
-    return at_once or (sys.stdin.isatty() and click.confirm("Make the arm ready and go on?", err=True))
-
-
 def _more(count: int) -> bool:
     answer = click.prompt(f"{count} samples; Enter records, q ends", default="", show_default=False, err=True)
     return str(answer).strip().lower() != "q"
@@ -202,11 +198,10 @@ def _print(recording: Recording, out: Path, as_json: bool) -> None:
     import msgspec
 
     from hecbench.diagnose import Severity, check
-    from hecbench.runner import prepare
 
     if not as_json:
         click.echo(f"{out}: {len(recording)} samples")
-    findings = check(recording, prepare)
+    findings = check(recording)
     if as_json:
         answer = {
             "recording": str(out),

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
-from hecbench.bundle_adjustment import adjust
-from hecbench.bundle_model import Noise, Problem, State, linearise
+from hecbench.bundle.adjustment import adjust
+from hecbench.bundle.model import Noise, Problem, State, linearise
 from hecbench.diagnose.fit import EXPLAINS, TYPICAL_NOISE, Fit, IdealCamera, hand_poses
 from hecbench.errors import SolverFailure
 from hecbench.recording import Mounting
@@ -93,9 +93,9 @@ def _starts(problem: Problem, camera_T_target: Array) -> Iterator[State]:
             continue
         scale, translation, marker = _given_rotation(rotation, hand, camera_T_target)
         turned = np.swapaxes(hand[:, :3, :3], 1, 2) @ rotation @ camera_T_target[:, :3, :3]
-        other_T_target = se3.make(_most_agreed(turned), marker)
+        carrier_T_target = se3.make(_most_agreed(turned), marker)
         parent_T_camera = se3.make(rotation, translation)
-        yield State(parent_T_camera, other_T_target, problem.base_T_flange, problem.parameters, scale)
+        yield State(parent_T_camera, carrier_T_target, problem.base_T_flange, problem.parameters, scale)
 
 
 def _from_rotations(hand: Array, camera_T_target: Array) -> Array | None:

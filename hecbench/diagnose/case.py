@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -10,17 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
-from hecbench.bundle_adjustment import Solution
+from hecbench.bundle.adjustment import Solution
 from hecbench.diagnose.calibrate import assumed_points, calibrate, enclosing_points
 from hecbench.diagnose.fit import LEAST_SAMPLES, Fit
 from hecbench.errors import HecbenchError, SolverFailure
+from hecbench.preparation import prepare
 from hecbench.recording import Mounting, Recording
-from hecbench.robot import flange_poses
+from hecbench.robots.posed import PosedRobot
 
 Array = NDArray[np.float64]
-
-Observe = Callable[[Recording], Recording]
-"""Fills what is not given but computable: base_T_flange from joints, camera_T_target from corners."""
 
 STANDS_OUT = 5.0
 """Variance ratio (6 and 6 N - 19 degrees of freedom) that a sample of ten exceeds once in 1500 times."""
@@ -31,27 +28,41 @@ _LEAST_SHARE = 0.5
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
+class Examination:
     """Findings read it; one that knows a cure hands on the cured case, so that the next ones see past the fault.
 
     Attributes:
-        recording: as given.
-        observe: computes poses; called again where a finding asks what another camera would have given.
+        recording: as given, with the corners and the intrinsics that were found in its images.
+        fitted_intrinsics: whether these intrinsics were fitted to the images, for want of given ones.
         judged: False once the data cannot be fitted, with the reason in a finding.
         size_factor: by which the declared size of the target is multiplied.
         explained: ids of samples whose fault has been named.
     """
 
     recording: Recording
-    observe: Observe
+    fitted_intrinsics: bool = False
     judged: bool = True
     size_factor: float = 1.0
     explained: frozenset[str] = frozenset()
 
+    @staticmethod
+    def of(recording: Recording, prepared: Recording | None = None) -> Examination:
+        """The examination of a recording; the truth is left out.
+
+        Args:
+            recording: as it was read.
+            prepared: what `preparation.prepare` made of it, when that was done already.
+        """
+        seen = prepare(recording) if prepared is None else prepared
+        given = recording.camera is not None and recording.camera.K is not None
+        fitted = not given and seen.camera is not None and seen.camera.K is not None
+        known = replace(recording.without_truth(), corners_px=seen.corners_px, camera=seen.camera)
+        return Examination(known, fitted)
+
     @cached_property
     def observed(self) -> Recording:
         """The recording with all poses that can be computed."""
-        return self.observe(self.recording)
+        return prepare(self.recording)
 
     @cached_property
     def usable(self) -> NDArray[np.int64]:
@@ -146,11 +157,10 @@ class Case:
     @cached_property
     def base_T_flange_by_joints(self) -> Array | None:
         """(samples, 4, 4) m by forward kinematics, NaN where joints are absent; None without a known robot."""
-        robot, joints_rad = self.recording.robot, self.recording.joints_rad
-        if robot is None or joints_rad is None or not (robot.model or robot.urdf):
+        if self.recording.joints_rad is None:
             return None
         try:
-            return flange_poses(robot, joints_rad)
+            return PosedRobot.of(self.recording, meshes=False).base_T_flange
         except HecbenchError:
             return None
 
@@ -167,7 +177,7 @@ class Case:
         """Ids of some of the usable samples."""
         return tuple(self.recording.sample_ids[i] for i in self.usable[chosen].tolist())
 
-    def with_robot_poses(self, base_T_flange: Array) -> Case:
+    def with_robot_poses(self, base_T_flange: Array) -> Examination:
         """The case as it would be with other robot poses (samples, 4, 4)."""
         return replace(self, recording=replace(self.recording, base_T_flange=base_T_flange))
 

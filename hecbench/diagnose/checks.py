@@ -26,11 +26,11 @@ from hecbench.diagnose import (
     target_scale,
     units,
 )
-from hecbench.diagnose.case import Case, Observe
+from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding
 from hecbench.recording import Recording
 
-_STEPS: tuple[Callable[[Case], tuple[Finding | None, Case]], ...] = (
+_STEPS: tuple[Callable[[Examination], tuple[Finding | None, Examination]], ...] = (
     image_quality.examine,
     joints_vs_pose.examine,
     sample_moving.examine,
@@ -50,15 +50,14 @@ _STEPS: tuple[Callable[[Case], tuple[Finding | None, Case]], ...] = (
 )
 
 
-def check(recording: Recording, observe: Observe = lambda recording: recording) -> list[Finding]:
+def check(recording: Recording, prepared: Recording | None = None) -> list[Finding]:
     """Every finding that applies to this recording, in the order in which the causes hide each other.
 
     Args:
         recording: as it was read.
-        observe: fills base_T_flange from joints and camera_T_target from corners where they are missing
-            (`hecbench.runner.prepare`); the findings themselves need no OpenCV.
+        prepared: what `preparation.prepare` made of it, so that nothing is detected twice.
     """
-    case, findings = Case(recording.without_truth(), observe), []
+    case, findings = Examination.of(recording, prepared), []
     for examine in _STEPS:
         finding, case = examine(case)
         if finding is not None:

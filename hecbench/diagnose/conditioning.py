@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hecbench.diagnose.case import Case
+from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity
 from hecbench.diagnose.precision import precision
 
@@ -12,7 +12,7 @@ ID = "conditioning"
 LIMIT_MM = 10.0
 
 
-def examine(case: Case) -> tuple[Finding | None, Case]:
+def examine(case: Examination) -> tuple[Finding | None, Examination]:
     """The expected error in the workspace, the condition number and the weakest direction of X.
 
     Rotations are scaled by the distance to the target, so that both halves of the twist are lengths.

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hecbench.diagnose.case import Case
+from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity
 
 ID = "consistency"
@@ -14,7 +14,7 @@ LIMIT = 0.25
 """Of the target's own motion in the image; data without a common calibration leave as much as it moves."""
 
 
-def examine(case: Case) -> tuple[Finding | None, Case]:
+def examine(case: Examination) -> tuple[Finding | None, Examination]:
     """The typical residual, as an angle of view turned into mm at the target."""
     if not case.can_be_fitted:
         return None, case

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hecbench.diagnose.case import Case
+from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity
 
 ID = "coverage"
@@ -15,7 +15,7 @@ NARROW = 0.03
 """Of the distance: positions closer together than that are seen under nearly the same angle."""
 
 
-def examine(case: Case) -> tuple[Finding | None, Case]:
+def examine(case: Examination) -> tuple[Finding | None, Examination]:
     """Sample count, and the principal extents of the target positions in the camera frame."""
     if case.agreed is None:
         if case.recording.target is None and case.observed.camera_T_target is None:

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
-from hecbench.bundle_adjustment import Solution, adjust
-from hecbench.bundle_model import Noise, Problem, State, predict
+from hecbench.bundle.adjustment import Solution, adjust
+from hecbench.bundle.model import Noise, Problem, State, predict
 from hecbench.recording import Mounting
 
 Array = NDArray[np.float64]
@@ -83,7 +83,7 @@ class Fit:
 
     def _predicted(self, base_T_flange: Array) -> Array:
         hand = hand_poses(self.problem.mounting, base_T_flange)
-        return np.asarray(se3.inverse(self.state.parent_T_camera) @ hand @ self.state.other_T_target)
+        return np.asarray(se3.inverse(self.state.parent_T_camera) @ hand @ self.state.carrier_T_target)
 
     def in_mm(self, pixels: float) -> float:
         """What a distance in the image is at the target."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench.diagnose.case import Case
+from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity, names
 from hecbench.errors import InputError
 from hecbench.recording import Recording
@@ -18,7 +18,7 @@ _DARK, _BRIGHT = 8, 247
 _CURE = "look at these images; record these samples again"
 
 
-def examine(case: Case) -> tuple[Finding | None, Case]:
+def examine(case: Examination) -> tuple[Finding | None, Examination]:
     """Share of clipped pixels, sharpness around the target (mean squared Laplacian), and repeated images."""
     recording = case.recording
     indices = [i for i, source in enumerate(recording.images or ()) if source is not None]
@@ -30,13 +30,15 @@ def examine(case: Case) -> tuple[Finding | None, Case]:
         "blurred": [],
         "repeated": [],
     }
+    reasons: list[str] = []
     sharpness: dict[int, float] = {}
     seen: dict[bytes, int] = {}
     for i in indices:
         try:
             grey = recording.image(i).mean(2)
-        except (InputError, OSError):
+        except (InputError, OSError) as error:
             faults["unreadable"].append(i)
+            reasons.append(str(error))
             continue
         if max((grey < _DARK).mean(), (grey > _BRIGHT).mean()) > _MOST_CLIPPED:
             faults["dark or overexposed"].append(i)
@@ -51,6 +53,7 @@ def examine(case: Case) -> tuple[Finding | None, Case]:
     if not found:
         return Finding(ID, Severity.OK, f"{len(indices)} images are readable, exposed and sharp"), case
     summary = "; ".join(f"{kind}: {names(which)}" for kind, which in found.items())
+    summary += f" ({reasons[0]})" if reasons else ""
     concerned = tuple(dict.fromkeys(sample for which in found.values() for sample in which))
     return Finding(ID, Severity.WARNING, summary, _CURE, float(len(concerned)), 0.0, concerned), case
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hecbench.diagnose.case import Case
+from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity
 from hecbench.diagnose.precision import precision
 
@@ -13,7 +13,7 @@ LIMIT = 3.0
 """Times the expected error: leaving out one good sample does not move the answer that far."""
 
 
-def examine(case: Case) -> tuple[Finding | None, Case]:
+def examine(case: Examination) -> tuple[Finding | None, Examination]:
     """One Gauss-Newton step without each sample, as displacement in the workspace."""
     found = precision(case)
     if found is None or case.agreed is None or len(found.gradients) < 5:

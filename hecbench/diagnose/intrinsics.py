@@ -8,9 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
-from hecbench.diagnose.case import Case
+from hecbench import pictures
+from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity
 from hecbench.diagnose.fit import EXPLAINS, Fit
+from hecbench.errors import InputError
 from hecbench.recording import CameraModel, Recording
 
 ID = "intrinsics"
@@ -27,7 +29,7 @@ _SAME_SIZE = 0.1
 _BY_SIZE = "use the intrinsics of the resolution the images were taken at, or scale fx, fy, cx, cy"
 
 
-def examine(case: Case) -> tuple[Finding | None, Case]:
+def examine(case: Examination) -> tuple[Finding | None, Examination]:
     """The principal point against the image's centre; where suspicious, how rescaled intrinsics would fit."""
     camera = case.recording.camera
     if camera is None:
@@ -36,7 +38,7 @@ def examine(case: Case) -> tuple[Finding | None, Case]:
         summary = f"the images are {size[0]}x{size[1]} px, the camera {camera.width}x{camera.height}"
         ratio = size[0] / camera.width
         return Finding(ID, Severity.CRITICAL, summary, _BY_SIZE, ratio, 1.0), _cured(case, camera, ratio)
-    if camera.K is None:
+    if camera.K is None or case.fitted_intrinsics:
         return Finding(ID, Severity.INFO, "no intrinsics are given", "calibrate them from the images"), case
     offset = float(np.abs(camera.K[:2, 2] / [camera.width, camera.height] - 0.5).max())
     outside = _outside(case.recording)
@@ -78,15 +80,12 @@ def examine(case: Case) -> tuple[Finding | None, Case]:
 
 def _image_size(recording: Recording) -> tuple[int, int] | None:
     """Width and height of the first image file, without decoding it."""
-    from PIL import Image
-
     first = next((source for source in recording.images or () if isinstance(source, Path)), None)
     if first is None:
         return None
     try:
-        with Image.open(first) as picture:
-            return picture.size
-    except (OSError, SyntaxError, ValueError):  # damaged or absent: image_quality says so
+        return pictures.size(first)
+    except InputError:  # damaged or absent: image_quality says so
         return None
 
 
@@ -105,13 +104,13 @@ def _scaled(camera: CameraModel, ratio: float) -> CameraModel:
     return replace(camera, K=K)
 
 
-def _cured(case: Case, camera: CameraModel, ratio: float) -> Case:
+def _cured(case: Examination, camera: CameraModel, ratio: float) -> Examination:
     if camera.K is None:
         return case
     return replace(case, recording=replace(case.recording, camera=_scaled(camera, ratio)))
 
 
-def _rescaled_fits(case: Case, camera: CameraModel) -> Iterator[tuple[float, float, Fit]]:
+def _rescaled_fits(case: Examination, camera: CameraModel) -> Iterator[tuple[float, float, Fit]]:
     """Typical residual (rad) and the fit for every ratio that can be fitted."""
     for ratio in _RATIOS:
         scaled = _scaled(camera, ratio)

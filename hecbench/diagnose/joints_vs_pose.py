@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.diagnose.calibrate import spread
-from hecbench.diagnose.case import Case, inverted
+from hecbench.diagnose.case import Examination, inverted
 from hecbench.diagnose.finding import Finding, Severity
 
 Array = NDArray[np.float64]
@@ -51,7 +51,7 @@ class Agreement:
         return degrees <= LIMIT_DEG and millimetres <= LIMIT_MM
 
 
-def agreement(case: Case) -> Agreement | None:
+def agreement(case: Examination) -> Agreement | None:
     """The simplest reading under which poses and joints agree, or the best of those that do not."""
     by_joints, given = case.base_T_flange_by_joints, case.recording.base_T_flange
     if by_joints is None or given is None:
@@ -91,7 +91,7 @@ def _most_agreed(poses: Array) -> Array:
     return np.asarray(candidates[np.median(apart, axis=1).argmin()])
 
 
-def examine(case: Case) -> tuple[Finding | None, Case]:
+def examine(case: Examination) -> tuple[Finding | None, Examination]:
     """The constant frame between poses and joints, and what is left beyond it."""
     found = agreement(case)
     if found is None:

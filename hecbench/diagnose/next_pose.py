@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
-from hecbench.bundle_model import predict
-from hecbench.diagnose.case import Case
+from hecbench.bundle.model import predict
+from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity
 from hecbench.diagnose.fit import hand_poses
 from hecbench.diagnose.precision import Precision, information_of, precision
@@ -25,7 +25,7 @@ _STEP = 2.0
 _FACING = 0.3
 
 
-def examine(case: Case) -> tuple[Finding | None, Case]:
+def examine(case: Examination) -> tuple[Finding | None, Examination]:
     """Tries tilts and shifts of the typical target pose that stay in view, and names the most useful."""
     found = precision(case)
     if found is None or case.agreed is None:
@@ -63,7 +63,7 @@ def _typical_rotation(rotations: Array) -> Array:
 
 def _information(found: Precision, camera_T_target: Array) -> Array:
     """About [X, Y] (M, 12, 12) that samples with these target poses would add."""
-    X, Y = found.state.parent_T_camera, found.state.other_T_target
+    X, Y = found.state.parent_T_camera, found.state.carrier_T_target
     hand = X @ camera_T_target @ se3.inverse(Y)
     poses = hand_poses(found.problem.mounting, hand)
     problem = replace(

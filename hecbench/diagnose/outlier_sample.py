@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench.diagnose.case import STANDS_OUT, Case
+from hecbench.diagnose.case import STANDS_OUT, Examination
 from hecbench.diagnose.finding import Finding, Severity, names
 
 ID = "outlier_sample"
@@ -16,7 +16,7 @@ NOTICEABLE_DEG = 0.5
 _ALIKE = 0.8
 
 
-def examine(case: Case) -> tuple[Finding | None, Case]:
+def examine(case: Examination) -> tuple[Finding | None, Examination]:
     """By how much the target of each sample is displaced from where the robot pose puts it."""
     if case.agreed is None:
         return None, case
@@ -52,7 +52,7 @@ def examine(case: Case) -> tuple[Finding | None, Case]:
     return Finding(ID, severity, summary, action, worst, limit, concerned), case
 
 
-def _moved_together(case: Case, odd: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
+def _moved_together(case: Examination, odd: NDArray[np.bool_]) -> NDArray[np.bool_] | None:
     """Samples next to each other of which two or more stand out and all are displaced alike in the image."""
     assert case.agreed is not None
     found, _ = case.agreed

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench.diagnose.case import STANDS_OUT, Case
+from hecbench.diagnose.case import STANDS_OUT, Examination
 from hecbench.diagnose.finding import Finding, Severity, names
 from hecbench.diagnose.fit import LEAST_SAMPLES, MUCH_BETTER
 
@@ -18,7 +18,7 @@ _FAR_BETTER = 0.02
 """With the wrong robot pose a planar target may have got its mirrored pose, which then still fits badly."""
 
 
-def examine(case: Case) -> tuple[Finding | None, Case]:
+def examine(case: Examination) -> tuple[Finding | None, Examination]:
     """Residuals with the robot poses shifted by one sample; then exchanges among the samples that disagree."""
     if not case.can_be_fitted or len(case.usable) <= LEAST_SAMPLES:
         return None, case
@@ -56,7 +56,7 @@ def _shifted(count: int, shift: int) -> tuple[NDArray[np.int64], NDArray[np.int6
     return (first, second) if shift > 0 else (second, first)
 
 
-def _exchanged(case: Case) -> list[tuple[int, int]]:
+def _exchanged(case: Examination) -> list[tuple[int, int]]:
     """Pairs of samples that disagree as given and agree with each other's robot pose."""
     if case.agreed is None:
         return []
@@ -78,7 +78,7 @@ def _exchanged(case: Case) -> list[tuple[int, int]]:
     return pairs
 
 
-def _repaired(case: Case, target: NDArray[np.int64], robot: NDArray[np.int64]) -> Case:
+def _repaired(case: Examination, target: NDArray[np.int64], robot: NDArray[np.int64]) -> Examination:
     """The case in which images `target` have the robot poses `robot`, both indices of usable samples."""
     observed = case.observed
     assert observed.base_T_flange is not None

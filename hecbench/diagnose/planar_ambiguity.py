@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
-from hecbench.diagnose.case import Case
+from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity, names
 
 Array = NDArray[np.float64]
@@ -22,7 +22,7 @@ FEW = 0.05
 _CLOSER = 0.5
 
 
-def examine(case: Case) -> tuple[Finding | None, Case]:
+def examine(case: Examination) -> tuple[Finding | None, Examination]:
     """Normals of the observed target poses against those that the calibration of all samples predicts."""
     target = case.recording.target
     if case.agreed is None or (target is not None and not target.is_planar):

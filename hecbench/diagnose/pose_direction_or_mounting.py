@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from hecbench import se3
-from hecbench.diagnose.case import Case, inverted, other
+from hecbench.diagnose.case import Examination, inverted, other
 from hecbench.diagnose.finding import Finding, Severity
 from hecbench.diagnose.fit import MUCH_BETTER
 
@@ -17,7 +17,7 @@ ID = "pose_direction_or_mounting"
 _AGREES_DEG = 10.0
 
 
-def examine(case: Case) -> tuple[Finding | None, Case]:
+def examine(case: Examination) -> tuple[Finding | None, Examination]:
     """Residuals of the declared reading against those of the inverted poses."""
     if not case.can_be_fitted or case.observed.base_T_flange is None:
         return None, case
@@ -38,7 +38,7 @@ def examine(case: Case) -> tuple[Finding | None, Case]:
     return Finding(ID, Severity.CRITICAL, summary, action, better, limit), turned
 
 
-def _cause_and_cure(case: Case) -> tuple[str, str]:
+def _cause_and_cure(case: Examination) -> tuple[str, str]:
     mounting = case.recording.mounting
     invert = "write base_T_flange, which maps flange coordinates to the base, instead of its inverse"
     remount = f"declare mounting '{other(mounting)}' instead of '{mounting}'"

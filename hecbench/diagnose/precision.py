@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
-from hecbench.bundle_model import Problem, State, linearise
-from hecbench.diagnose.case import Case
+from hecbench.bundle.model import Problem, State, linearise
+from hecbench.diagnose.case import Examination
 from hecbench.diagnose.fit import TYPICAL_NOISE
 from hecbench.recording import Mounting
 from hecbench.workspace import cube_corners
@@ -69,7 +69,7 @@ def information_of(problem: Problem, state: State) -> tuple[Array, Array]:
 
 
 @lru_cache(maxsize=1)
-def precision(case: Case) -> Precision | None:
+def precision(case: Examination) -> Precision | None:
     """None when there is no calibration."""
     if case.agreed is None or case.solution is None:
         return None

@@ -12,7 +12,7 @@ import numpy as np
 
 from hecbench import se3
 from hecbench.diagnose.calibrate import spread
-from hecbench.diagnose.case import Case
+from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity
 
 ID = "rotation_diversity"
@@ -22,7 +22,7 @@ GOOD_SECOND_AXIS_DEG = 5.0
 _TILT = "tilt the hand by 20 to 40 deg about two different axes between samples"
 
 
-def examine(case: Case) -> tuple[Finding | None, Case]:
+def examine(case: Examination) -> tuple[Finding | None, Examination]:
     """The largest rotation between two samples, and the rms rotation about the second principal axis."""
     poses = case.observed.base_T_flange
     if poses is None:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
-from hecbench.diagnose.case import Case
+from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity, names
 from hecbench.diagnose.joints_vs_pose import agreement
 
@@ -25,7 +25,7 @@ _TIMES_TYPICAL = 6.0
 _CURE = "wait until the arm stands still before taking image and pose, and record these samples again"
 
 
-def examine(case: Case) -> tuple[Finding | None, Case]:
+def examine(case: Examination) -> tuple[Finding | None, Examination]:
     """Joints against poses, and the stamps of camera and robot against the arm's speed between samples."""
     finding = _by_joints(case) or _by_stamps(case)
     if finding is None:
@@ -33,7 +33,7 @@ def examine(case: Case) -> tuple[Finding | None, Case]:
     return finding, replace(case, explained=case.explained | frozenset(finding.samples))
 
 
-def _by_joints(case: Case) -> Finding | None:
+def _by_joints(case: Examination) -> Finding | None:
     found = agreement(case)
     if found is None or not found.holds:
         return None
@@ -53,7 +53,7 @@ def _by_joints(case: Case) -> Finding | None:
     return Finding(ID, Severity.CRITICAL, summary, _CURE, worst, LIMIT_MM, concerned)
 
 
-def _by_stamps(case: Case) -> Finding | None:
+def _by_stamps(case: Examination) -> Finding | None:
     recording = case.recording
     poses, robot, camera = recording.base_T_flange, recording.robot_stamp_s, recording.camera_stamp_s
     if poses is None or robot is None or camera is None:

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hecbench.diagnose.case import Case
+from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity
 
 ID = "target_scale"
@@ -15,7 +15,7 @@ NOTICEABLE = 0.012
 _SIGMAS = 3.0
 
 
-def examine(case: Case) -> tuple[Finding | None, Case]:
+def examine(case: Examination) -> tuple[Finding | None, Examination]:
     """The true size over the declared one, with its standard deviation, from the robot's motion."""
     if case.solution is None:
         return None, case

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from hecbench.diagnose.case import Case
+from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity
 
 ID = "units"
@@ -17,7 +17,7 @@ _FACTORS = {1000.0: "mm", 100.0: "cm", 39.37: "inch"}
 _NEAR = 1.3
 
 
-def examine(case: Case) -> tuple[Finding | None, Case]:
+def examine(case: Examination) -> tuple[Finding | None, Examination]:
     """The reach of the robot poses, and the target's motion against the robot's."""
     poses, target = case.observed.base_T_flange, case.recording.target
     if poses is None:
@@ -67,7 +67,7 @@ def _unit(scale: float) -> tuple[float, str] | None:
     return None
 
 
-def _rescaled_robot(case: Case, factor: float) -> Case:
+def _rescaled_robot(case: Examination, factor: float) -> Examination:
     """The case with robot translations divided."""
     poses = case.observed.base_T_flange
     assert poses is not None
@@ -76,6 +76,6 @@ def _rescaled_robot(case: Case, factor: float) -> Case:
     return case.with_robot_poses(poses)
 
 
-def _resized_target(case: Case, factor: float) -> Case:
+def _resized_target(case: Examination, factor: float) -> Examination:
     """The case with the target's size multiplied."""
     return replace(case, size_factor=case.size_factor * factor)

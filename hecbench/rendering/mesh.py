@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.errors import InputError
-from hecbench.robot import RobotModel
-from hecbench.robot_meshes import Part
+from hecbench.robots.meshes import Part
+from hecbench.robots.model import RobotModel
 
 Float = NDArray[np.float32]
 Int = NDArray[np.int32]

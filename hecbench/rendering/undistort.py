@@ -76,3 +76,12 @@ class Undistortion:
             for c in range(planes.shape[-1])
         ]
         return np.stack(resampled, -1).reshape(values.shape)
+
+
+def shrunk_intrinsics(K: Array, across: float, down: float | None = None) -> Array:
+    """K of an image resized by these factors, pixel centres at integers before and after; down None: as across."""
+    scale = np.array([across, across if down is None else down])
+    small = K.copy()
+    small[:2] *= scale[:, None]
+    small[:2, 2] += 0.5 * scale - 0.5
+    return small

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hecbench import evidence, files, store, trial_record
+from hecbench import files
 from hecbench.errors import InputError
 from hecbench.estimate import Estimate, best_first
-from hecbench.evidence import Evidence
 from hecbench.report.figures import figures
 from hecbench.report.recording_figures import agreement_figure, overlays, residual_figure, scene_figure
 from hecbench.report.section import Section
@@ -18,7 +17,9 @@ from hecbench.report.studies import is_study
 from hecbench.report.studies import sections as sections_of_studies
 from hecbench.report.tables import Group, groups, table
 from hecbench.report.trials import sections as sections_of_trials
-from hecbench.trial_record import TrialRecord
+from hecbench.storage import evidence, store, trial_record
+from hecbench.storage.evidence import Evidence
+from hecbench.storage.trial_record import TrialRecord
 
 FILE_NAME = "report.html"
 

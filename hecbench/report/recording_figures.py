@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.estimate import Estimate
-from hecbench.evidence import Evidence
 from hecbench.recording import CameraModel, Mounting
 from hecbench.rendering.undistort import distort
 from hecbench.report.svg import DARK, LIGHT, RED, panel, svg
+from hecbench.storage.evidence import Evidence
 from hecbench.workspace import cube_corners
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ def residuals_px(evidence: Evidence, estimate: Estimate) -> Array | None:
 
 def _predicted_px(evidence: Evidence, estimate: Estimate) -> Array | None:
     camera = estimate.camera or evidence.camera
-    X, Y, points_m = estimate.parent_T_camera, estimate.other_T_target, evidence.points_m
+    X, Y, points_m = estimate.parent_T_camera, estimate.carrier_T_target, evidence.points_m
     if camera is None or camera.K is None or X is None or Y is None or points_m is None:
         return None
     if evidence.base_T_flange is None:
@@ -89,7 +89,7 @@ def scene_figure(evidence: Evidence, estimate: Estimate) -> str | None:
     base_T_flange = evidence.base_T_flange[np.isfinite(evidence.base_T_flange).all((1, 2))]
     eye_to_hand = evidence.mounting is Mounting.EYE_TO_HAND
     cameras = X[None] if eye_to_hand else base_T_flange @ X
-    Y = estimate.other_T_target
+    Y = estimate.carrier_T_target
     targets = np.zeros((0, 4, 4)) if Y is None else base_T_flange @ Y if eye_to_hand else Y[None]
     figure, axes = panel(10.0, 4.2, columns=2)
     for view, (across, up) in zip(axes, ((0, 2), (0, 1)), strict=True):

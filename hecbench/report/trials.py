@@ -19,7 +19,7 @@ from hecbench.report.cells import ABSENT
 from hecbench.report.section import Section
 from hecbench.report.svg import COLOURS, panel, svg
 from hecbench.report.tables import Table
-from hecbench.trial_record import TASKS, Outcome, TrialRecord, picture_name
+from hecbench.storage.trial_record import TASKS, Outcome, TrialRecord, picture_name
 
 PAPER_PCT = {
     "ur5e": {

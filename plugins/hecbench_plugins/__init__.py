@@ -1,12 +1,4 @@
-"""Calibration methods and rulers, one per file."""
+"""Calibration methods and evaluators, one per file."""
 
-from hecbench.modules import submodules
-
-plugin_modules = (
-    *submodules(__name__, "solvers"),
-    *submodules(__name__, "observers"),
-    *submodules(__name__, "evaluators"),
-    *submodules(__name__, "segmenters"),
-    *submodules(__name__, "translators"),
-)
-"""Modules whose hooks belong to this package, imported one by one when plugins are listed."""
+plugin_folders = ("solvers", "observers", "evaluators", "segmenters", "translators")
+"""Folders whose modules are plugins, imported one by one when plugins are listed."""

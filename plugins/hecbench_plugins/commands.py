@@ -15,12 +15,13 @@ from hecbench.errors import InputError
 @click.option("--refit-intrinsics", is_flag=True, help="Calibrate the camera although K is given.")
 def detect(recording: Path, destination: Path, refit_intrinsics: bool) -> None:
     """Find the target in a RECORDING's images; write the recording with its corners and pictures of them to DEST."""
-    from hecbench import recording_io, runner
+    from hecbench import preparation
+    from hecbench.storage import recording_io
     from hecbench_plugins import detection
 
     if recording_io.is_recording(destination):
         raise InputError(f"{destination}: holds a recording already; give another destination")
-    found = detection.detect(runner.load_recording(recording), refit_intrinsics=refit_intrinsics)
+    found = detection.detect(preparation.load_recording(recording), refit_intrinsics=refit_intrinsics)
     pictures = detection.write_overlays(found, destination / "detections")
     recording_io.save(found, destination)
     for note in found.notes:

@@ -11,8 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hecbench import conformance, recording_io, se3
+from hecbench import conformance, se3
 from hecbench.recording import Mounting
+from hecbench.storage import recording_io
 
 HECBENCH = Path(sys.executable).parent / "hecbench"
 
@@ -178,7 +179,7 @@ def test_demo_makes_tables_and_a_report(hecbench, tmp_path):
 def test_help_imports_nothing_heavy():
     code = (
         "import sys; sys.argv = ['hecbench', '--help']\n"
-        "from hecbench.cli import main\n"
+        "from hecbench.commands.cli import main\n"
         "try:\n    main()\nexcept SystemExit:\n    pass\n"
         "heavy = {'numpy', 'scipy', 'cv2', 'torch', 'matplotlib', 'numba', 'mujoco'} & set(sys.modules)\n"
         "assert not heavy, heavy"

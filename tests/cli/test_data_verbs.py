@@ -6,8 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hecbench import conformance, recording_io, se3
+from hecbench import conformance, se3
 from hecbench.recording import Mounting
+from hecbench.storage import recording_io
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from hecbench_datasets.reading.rigid import rigid_fit
 
 from hecbench import se3
 from hecbench.errors import InputError
-from hecbench.robot import load_robot
+from hecbench.robots.model import load_robot
 
 R = np.pi / 2
 PANDA_ORIGINS = (

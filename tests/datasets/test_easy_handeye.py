@@ -5,9 +5,10 @@ import pytest
 import yaml
 from hecbench_datasets import easy_handeye
 
-from hecbench import export, se3
+from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.estimate import Estimate
+from hecbench.exchange import export
 from hecbench.recording import Mounting
 
 

@@ -7,8 +7,8 @@ from scipy.spatial.transform import Rotation
 
 from hecbench import se3
 from hecbench.errors import InputError
+from hecbench.preparation import load_recording
 from hecbench.recording import Mounting
-from hecbench.runner import load_recording
 
 
 def test_universal_robots_poses_and_quaternions_scalar_first(tmp_path, sniffers, cell):

@@ -1,8 +1,11 @@
 """One simulated controller per test process, as new before every test, and the driver on it."""
 
+import socket
+
 import numpy as np
 import pytest
 from hecbench_hardware.controller_sim.process import SimulatedController
+from hecbench_hardware.grippers import robotiq
 from hecbench_hardware.kinematics import ARMS
 from hecbench_hardware.ur.robot import UrRobot
 from hecbench_hardware.ur.stream import Supervision
@@ -42,6 +45,23 @@ def robot(connect):
     enabled = connect()
     enabled.enable()
     return enabled
+
+
+@pytest.fixture
+def registers(controller):
+    """Reads what the controller's Robotiq gripper was sent and where it is."""
+
+    def read():
+        found = {}
+        with socket.create_connection((controller.host, robotiq.PORT)) as client:
+            lines = client.makefile("rw", newline="\n")
+            for name in ("ACT", "GTO", "PRE", "POS"):
+                lines.write(f"GET {name}\n")
+                lines.flush()
+                found[name] = int(lines.readline().split()[1])
+        return found
+
+    return read
 
 
 @pytest.fixture

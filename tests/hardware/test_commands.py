@@ -14,9 +14,10 @@ from hecbench_hardware.commands import record
 from hecbench_hardware.kinematics import ARMS
 from PIL import Image
 
-from hecbench import recording_io, se3
+from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
+from hecbench.storage import recording_io
 from hecbench.targets import ChessboardTarget
 
 FAST = ("--set", "robot.time_scale=50", "--set", "robot.max_age_s=1")

@@ -24,6 +24,7 @@ def gripper(name, **options):
 @pytest.fixture
 def two_finger(controller):
     device = gripper("robotiq", host=controller.host, timeout_s=1)
+    device.enable()
     yield device
     device.close()
 
@@ -52,6 +53,7 @@ def test_robotiq_feels_an_object(two_finger, controller):
 )
 def test_robotiq_faults_end_in_time(controller, verb, complaint):
     device = RobotiqGripper(controller.host, timeout_s=0.2)
+    device.enable()
     controller.fault(verb)
     with pytest.raises(DeviceFault, match=complaint) as caught:
         device.close_fingers()
@@ -89,7 +91,7 @@ def compute_box():
     class Server(socketserver.ThreadingTCPServer):
         allow_reuse_address = True
         daemon_threads = True
-        width, object_width, status, polls, jammed = 500, None, 0, 0, False
+        width, object_width, status, polls, jammed, writes = 500, None, 0, 0, False, 0
 
         def answer(self, request):
             function, address, count = struct.unpack_from(">BHH", request)
@@ -99,6 +101,7 @@ def compute_box():
                 values = {267: self.width, 268: self.status | busy}
                 words = [values[address + i] for i in range(count)]
                 return struct.pack(f">BB{count}H", 3, 2 * count, *words)
+            self.writes += 1
             if function == 16 and count == 3:
                 _, width, command = struct.unpack_from(">3H", request, 6)
                 assert command == 1
@@ -118,6 +121,7 @@ def compute_box():
 def test_onrobot(compute_box):
     port = compute_box.server_address[1]
     device = gripper("onrobot_rg2", host="127.0.0.1", port=port)
+    device.enable()
     device.open_fingers()
     assert device.status().width_m == pytest.approx(0.11)
     compute_box.object_width = 300
@@ -135,6 +139,7 @@ def test_onrobot(compute_box):
 def test_onrobot_faults(compute_box):
     port = compute_box.server_address[1]
     device = OnRobotGripper("127.0.0.1", port, timeout_s=0.2)
+    device.enable()
     compute_box.jammed = True
     with pytest.raises(DeviceFault, match="do not arrive"):
         device.open_fingers()
@@ -149,13 +154,44 @@ def test_onrobot_faults(compute_box):
         OnRobotGripper("127.0.0.250")
 
 
+def shown(receive, output, on, timeout_s=10.0):
+    """Whether the controller shows an output on or off within a time that is long for a busy machine."""
+    deadline = time.monotonic() + timeout_s
+    while receive.getDigitalOutState(output) is not on and time.monotonic() < deadline:
+        time.sleep(0.01)
+    return receive.getDigitalOutState(output) is on
+
+
+def test_nothing_is_sent_to_fingers_before_they_are_enabled(controller, compute_box, registers):
+    untouched, width = registers(), compute_box.width
+    receive = rtde_receive.RTDEReceiveInterface(controller.host)
+    outputs = receive.getActualDigitalOutputBits()
+    devices = [
+        gripper("robotiq", host=controller.host),
+        gripper("onrobot_rg2", host="127.0.0.1", port=compute_box.server_address[1]),
+        gripper("digital_output", host=controller.host, bank="tool", number=1, inverted="yes"),
+    ]
+    for device in devices:
+        for command in (device.open_fingers, device.close_fingers):
+            with pytest.raises(InputError, match="read-only"):
+                command()
+        device.stop()
+        device.close()
+    receive.disconnect()
+    assert registers() == untouched
+    assert compute_box.writes == 0
+    assert compute_box.width == width
+    assert receive.getActualDigitalOutputBits() == outputs
+
+
 def test_digital_output(controller):
     receive = rtde_receive.RTDEReceiveInterface(controller.host)
     device = gripper("digital_output", host=controller.host, bank="tool", number=1, stroke_s=0.1)
+    device.enable()
     assert not device.close_fingers().moving
-    assert receive.getDigitalOutState(17)
+    assert shown(receive, 17, True)
     device.open_fingers()
-    assert not receive.getDigitalOutState(17)
+    assert shown(receive, 17, False)
     with pytest.raises(InputError, match="one output"):
         device.open_fingers(0.02)
     with pytest.raises(InputError, match="one output"):
@@ -168,6 +204,7 @@ def test_digital_output(controller):
 
 def test_none():
     device = gripper("none")
+    device.enable()
     device.open_fingers()
     assert not device.close_fingers().holding
     device.stop()

@@ -7,19 +7,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hecbench_hardware.cameras.images import ImageFolder
+from hecbench_hardware.clearance import check_motion
 from hecbench_hardware.devices import DeviceFault, Fault
 from hecbench_hardware.kinematics import ARMS
-from hecbench_hardware.limits import Box, Limits, check_path, joint_path
+from hecbench_hardware.limits import Box, Limits
+from hecbench_hardware.motions import JointMotion
 from hecbench_hardware.recorder.plan import check_plan, dry_run, write_plan
 from hecbench_hardware.recorder.poses import Criterion, View, diverse_plan, informative_plan
 from hecbench_hardware.recorder.record import Recorder
 from hecbench_hardware.recorder.session import FILE_NAME
 from PIL import Image
 
-from hecbench import recording_io, se3
+from hecbench import se3
 from hecbench.errors import HecbenchError, InputError
 from hecbench.next_view import RobotView
 from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
+from hecbench.storage import recording_io
 from hecbench.targets import AprilTagTarget
 
 ARM = ARMS["ur5e"]
@@ -204,14 +207,14 @@ def test_diverse_plan(cell, ready_pose):
     assert np.array_equal(planned.joints_rad, again.joints_rad)
     assert np.array_equal(planned.joints_rad[0], ready_pose)
     for start, end in zip(planned.joints_rad, planned.joints_rad[1:], strict=False):
-        check_path(ARM, joint_path(start, end), limits)
+        check_motion(ARM, JointMotion(ARM, start, end), limits)
 
     def hands(joints):
         poses = ARM.forward(joints)
         return poses if cell.mounting is Mounting.EYE_TO_HAND else se3.inverse(poses)
 
-    other_T_target = se3.inverse(hands(ready_pose)) @ cell.initial_parent_T_camera @ cell.camera_T_target[0]
-    camera_T_target = se3.inverse(cell.initial_parent_T_camera) @ hands(planned.joints_rad) @ other_T_target
+    carrier_T_target = se3.inverse(hands(ready_pose)) @ cell.initial_parent_T_camera @ cell.camera_T_target[0]
+    camera_T_target = se3.inverse(cell.initial_parent_T_camera) @ hands(planned.joints_rad) @ carrier_T_target
     points = se3.transform_points(camera_T_target, cell.target.points_m) @ K.T
     px = points[..., :2] / points[..., 2:]
     assert (points[..., 2] > 0).all()
@@ -264,7 +267,7 @@ def test_informative_plan(markerless, ready_pose, criterion):
     assert np.array_equal(planned.joints_rad[0], ready_pose)
     assert len(planned) == 5
     for start, end in zip(planned.joints_rad, planned.joints_rad[1:], strict=False):
-        check_path(ARM, joint_path(start, end), limits)
+        check_motion(ARM, JointMotion(ARM, start, end), limits)
     view = RobotView(markerless)
     for joints in planned.joints_rad[1:]:
         assert view.look(joints, markerless.initial_parent_T_camera).in_view >= 0.6

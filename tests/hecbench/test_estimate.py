@@ -13,7 +13,7 @@ from hecbench.recording import CameraModel, Mounting
 
 SCHEMA_KEYS = [
     "schema", "solver", "recording", "mounting", "parent_link", "camera", "status", "reason", "parent_T_camera",
-    "other_T_target", "covariance", "termination", "iterations", "renders", "seconds", "diagnostics", "extras",
+    "carrier_T_target", "covariance", "termination", "iterations", "renders", "seconds", "diagnostics", "extras",
     "errors", "held_out", "provenance",
 ]  # fmt: skip
 
@@ -42,6 +42,13 @@ def test_file_round_trip(tmp_path, rng):
     assert read.to_json() == written.to_json()
     assert read.diagnostics == {"spread": 1.5, "flags": [True, False], "none": None}
     json.loads((tmp_path / "deep" / "park.json").read_text())
+
+
+def test_files_of_version_0_1_are_read():
+    written = Estimate(np.eye(4), carrier_T_target=se3.exp(np.arange(6) / 10)).to_json()
+    written["other_T_target"] = written.pop("carrier_T_target")
+    read = module.decode(json.dumps(written).encode(), "old.json")
+    np.testing.assert_allclose(read.carrier_T_target, se3.exp(np.arange(6) / 10))
 
 
 @pytest.mark.parametrize(

@@ -9,17 +9,17 @@ from pathlib import Path
 
 import numpy as np
 
-from hecbench import runner, se3
-from hecbench.conventions import HINTS_NAME, Proof, prove
+from hecbench import pictures, preparation, se3
 from hecbench.errors import InputError
-from hecbench.pose_numbers import Reading, readings
+from hecbench.exchange.conventions import HINTS_NAME, Proof, prove
+from hecbench.exchange.pose_numbers import Reading, readings
 from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
 from hecbench_datasets.reading.cameras import camera_in
 from hecbench_datasets.reading.columns import Columns, Poses
 from hecbench_datasets.reading.hints import Hints, hinted_target
 from hecbench_datasets.reading.joint_poses import JointReading, joint_readings
 from hecbench_datasets.reading.seen_targets import seen_target
-from hecbench_datasets.reading.sources import Array, image_size, natural
+from hecbench_datasets.reading.sources import Array, natural
 from hecbench_datasets.reading.survey import Survey
 
 _MOST_LOOKED_AT = 3
@@ -83,7 +83,7 @@ def load_beside_pictures(
         recording,
         mounting=mounting,
         robot=way.robot,
-        base_T_flange=None if way.robot and (way.robot.model or way.robot.urdf) else way.reading.poses,
+        base_T_flange=None if way.robot and way.robot.source else way.reading.poses,
         joints_rad=way.joints_rad,
         notes=tuple(notes),
     )
@@ -122,14 +122,14 @@ def _proven(path: Path, ways: Sequence[_Way], recording: Recording, hints: Hints
     A board that looks the same from two ends is turned as the robot's motion demands, so the pictures are looked at
     again under the readings that the angles allow.
     """
-    seen = runner.prepare(recording)
+    seen = preparation.prepare(recording)
     try:
         return _held_still(path, ways, seen, hints)
     except InputError as as_first_seen:
         if seen.camera_T_target is None:
             raise
         for way in _by_angles(ways, seen.camera_T_target)[:_MOST_LOOKED_AT]:
-            turned = runner.prepare(replace(recording, base_T_flange=way.reading.poses))
+            turned = preparation.prepare(replace(recording, base_T_flange=way.reading.poses))
             try:
                 return _held_still(path, ways, turned, hints)
             except InputError:
@@ -197,9 +197,12 @@ def _paired(found: Survey, stream: Columns, poses: Poses | None, hints: Hints) -
             f"{found.path}: {names} both hold {count} pictures, two for one pose; write 'images: "
             f"{_relative(fitting[0][0].parent, found.path)}' into {HINTS_NAME}"
         )
-    shown = ", ".join(f"{len(files)} in {_relative(folder, found.path)}" for folder, files in folders.items())
+    shown = " and ".join(
+        f"{len(files)} pictures" + (f" in {_relative(folder, found.path)}" if len(folders) > 1 else "")
+        for folder, files in folders.items()
+    )
     raise InputError(
-        f"{found.path}: {shown or 'no'} pictures for {count} rows of {Path(stream.source).name}; pair them up, or add "
+        f"{found.path}: {shown or 'no pictures'} for {count} rows of {Path(stream.source).name}; pair them up, or add "
         "a column with the pictures' names"
     )
 
@@ -245,7 +248,7 @@ def _camera(found: Survey, picture: Path, hints: Hints) -> tuple[CameraModel | N
     folder = found.path if found.path.is_dir() else found.path.parent
     camera = camera_in(found.files, picture)
     if camera is None:
-        image_size(picture)
+        pictures.size(picture)
         return None, []
     return camera[0], [f"{folder}: intrinsics from {camera[1].name}"]
 

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from hecbench import pictures
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel
-from hecbench_datasets.reading.sources import YAML_SUFFIXES, Array, image_size, json_value, text, yaml_value
+from hecbench_datasets.reading.sources import YAML_SUFFIXES, Array, json_value, text, yaml_value
 from hecbench_datasets.reading.tables import numpy_arrays
 
 _FILE = re.compile(r"intrinsic|camera|calib|^k$|param|config|settings|_k$|mtx", re.IGNORECASE)
@@ -29,7 +30,7 @@ def camera_in(files: list[Path], picture: Path) -> tuple[CameraModel, Path] | No
         if file.suffix.lower() not in _SUFFIXES or not _FILE.search(file.stem):
             continue
         try:
-            camera = camera_of(_content(file), image_size(picture))
+            camera = camera_of(_content(file), pictures.size(picture))
         except InputError:
             continue
         if camera is not None:

@@ -8,8 +8,8 @@ from typing import Any, Literal
 import msgspec
 import numpy as np
 
-from hecbench.conventions import HINTS_NAME
 from hecbench.errors import InputError
+from hecbench.exchange.conventions import HINTS_NAME
 from hecbench.recording import CameraModel, Mounting
 from hecbench.targets import AprilTagTarget, CharucoTarget, ChessboardTarget, PointsTarget, Target
 from hecbench_datasets.reading.sources import yaml_value

@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from hecbench.errors import InputError
-from hecbench.pose_numbers import Reading
+from hecbench.exchange.pose_numbers import Reading
 from hecbench.recording import RobotDescription
-from hecbench.robot import KNOWN_ARMS, flange_poses, load_robot
+from hecbench.robots.model import KNOWN_ARMS, load_robot
 from hecbench_datasets.reading.arms import PANDA
 from hecbench_datasets.reading.sources import Array
 
@@ -65,14 +65,15 @@ def _of_robot(robot: str | Path, joints: Array, names: Sequence[str], unit: str)
         )
         poses = PANDA.base_T_flange(joints)
     else:
-        described, joints = _described(robot, joints, names)
-        poses = flange_poses(described, joints)
+        described, joints, poses = _described(robot, joints, names)
     text = f"{Path(robot).stem} joints in {unit}"
     yield JointReading(Reading(poses, f"base_T_flange {text}"), described, joints)
 
 
-def _described(robot: str | Path, joints: Array, names: Sequence[str]) -> tuple[RobotDescription, Array]:
-    """The robot, and its joints in its order."""
+def _described(
+    robot: str | Path, joints: Array, names: Sequence[str]
+) -> tuple[RobotDescription, Array, Array]:
+    """The robot, its joints in its order, and its flange poses."""
     known = robot in KNOWN_ARMS
     model = load_robot(robot, meshes=False)
     own = model.joint_names
@@ -87,7 +88,11 @@ def _described(robot: str | Path, joints: Array, names: Sequence[str]) -> tuple[
         )
     base = next((link for link in _BASES if link in model.links), model.links[0])
     flange = next((link for link in _FLANGES if link in model.links), model.joints[-1].child)
-    model_name, urdf = (str(robot), None) if known else (None, Path(robot))
-    return RobotDescription(
-        model=model_name, urdf=urdf, base_link=base, flange_link=flange, joint_names=own
-    ), joints
+    described = RobotDescription(
+        model=str(robot) if known else None,
+        urdf=None if known else Path(robot),
+        base_link=base,
+        flange_link=flange,
+        joint_names=own,
+    )
+    return described, joints, model.forward(joints, own, base=base, tip=flange)

@@ -9,9 +9,9 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from hecbench.conventions import prove
 from hecbench.errors import InputError
-from hecbench.pose_numbers import Reading, readings
+from hecbench.exchange.conventions import prove
+from hecbench.exchange.pose_numbers import Reading, readings
 from hecbench.recording import Mounting, Recording
 from hecbench_datasets.reading.hints import Hints
 

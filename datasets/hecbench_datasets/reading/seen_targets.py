@@ -8,8 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import files
-from hecbench_datasets.reading.sources import picture
+from hecbench import pictures
 
 _ASKED = 5
 """Pictures looked at, evenly spread."""
@@ -31,7 +30,7 @@ def seen_target(images: Sequence[Path]) -> str:
     chosen = [
         images[i] for i in np.unique(np.linspace(0, len(images) - 1, min(len(images), _ASKED)).astype(int))
     ]
-    greys = [picture(files.read_bytes(image), "L", str(image)) for image in chosen]
+    greys = [pictures.image(image, str(image)).mean(2).astype(np.uint8) for image in chosen]
     return (
         _markers(greys)
         or _chessboard(greys)

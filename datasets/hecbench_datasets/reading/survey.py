@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from hecbench.conventions import HINTS_NAME
 from hecbench.errors import InputError
+from hecbench.exchange.conventions import HINTS_NAME
 from hecbench_datasets.reading.columns import Columns, recognise, taking_turns
 from hecbench_datasets.reading.sources import IMAGE_SUFFIXES, natural
 from hecbench_datasets.reading.tables import TABLE_SUFFIXES, Table, read_table

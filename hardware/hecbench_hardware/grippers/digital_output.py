@@ -11,6 +11,7 @@ from hecbench.errors import InputError
 from hecbench.registry import hookimpl
 from hecbench.specs import DeviceSpec, Kind
 from hecbench_hardware.devices import GripperStatus
+from hecbench_hardware.grippers.guard import Guarded
 from hecbench_hardware.options import flag, number, text
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ _COUNTS = {"Standard": 8, "Configurable": 8, "Tool": 2}
 
 
 @dataclass
-class DigitalOutputGripper:
+class DigitalOutputGripper(Guarded):
     """Output on is closed, unless inverted."""
 
     outputs: Outputs
@@ -55,6 +56,7 @@ class DigitalOutputGripper:
         self.outputs.close()
 
     def _switch(self, *, on: bool) -> None:
+        self.refuse_disabled()
         self.outputs.call(f"set{self.bank}DigitalOut", self.number, on)
         time.sleep(self.stroke_s)
 

@@ -16,6 +16,9 @@ class NoGripper:
 
     name: str = "none"
 
+    def enable(self) -> None:
+        """Nothing."""
+
     def open_fingers(self, width_m: float | None = None) -> None:
         """Nothing."""
 

@@ -16,6 +16,7 @@ from hecbench.errors import InputError
 from hecbench.registry import hookimpl
 from hecbench.specs import DeviceSpec, Kind
 from hecbench_hardware.devices import DeviceFault, Fault, GripperStatus
+from hecbench_hardware.grippers.guard import Guarded
 from hecbench_hardware.options import number, text
 
 UNIT = 65
@@ -25,10 +26,12 @@ _GRIP, _STOP = 1, 8
 _BUSY, _HOLDING, _SAFETY = 1 << 0, 1 << 1, 0b1111100
 _READ, _WRITE = 3, 16
 _POLL_S = 0.02
+_SHORTEST_BODY = 2
+"""Function code and exception."""
 
 
 @dataclass
-class OnRobotGripper:
+class OnRobotGripper(Guarded):
     """Connected. A command that does not end within `timeout_s` is a fault."""
 
     host: str
@@ -63,13 +66,15 @@ class OnRobotGripper:
 
     def stop(self) -> None:
         """Hold the fingers where they are."""
-        self._write(_TARGET_FORCE + 2, [_STOP])
+        if self.enabled:
+            self._write(_TARGET_FORCE + 2, [_STOP])
 
     def close(self) -> None:
         """Disconnect."""
         self._socket.close()
 
     def _go(self, width_m: float, force_n: float) -> None:
+        self.refuse_disabled()
         if not 0 <= width_m <= STROKE_M:
             raise InputError(f"a width of {width_m} m is not within 0 to {STROKE_M} m")
         if not 0 < force_n <= MAX_FORCE_N:
@@ -85,7 +90,9 @@ class OnRobotGripper:
 
     def _read(self, address: int, count: int) -> tuple[int, ...]:
         body = self._exchange(struct.pack(">BHH", _READ, address, count))
-        return struct.unpack(f">{count}H", body[2 : 2 + 2 * count])
+        if len(body) != 2 + 2 * count:
+            raise DeviceFault(Fault.GRIPPER, self.name, f"{len(body)} bytes instead of {count} registers")
+        return struct.unpack(f">{count}H", body[2:])
 
     def _write(self, address: int, values: list[int]) -> None:
         count = len(values)
@@ -98,7 +105,7 @@ class OnRobotGripper:
         try:
             self._socket.sendall(header + request)
             length = struct.unpack(">HHHB", self._receive(7))[2]
-            body = self._receive(length - 1)
+            body = self._receive(max(length - 1, _SHORTEST_BODY))
         except OSError as error:
             raise DeviceFault(
                 Fault.GRIPPER, self.name, f"no answer ({error.strerror or 'time-out'})"

@@ -16,6 +16,7 @@ from hecbench.errors import InputError
 from hecbench.registry import hookimpl
 from hecbench.specs import DeviceSpec, Kind
 from hecbench_hardware.devices import DeviceFault, Fault, GripperStatus
+from hecbench_hardware.grippers.guard import Guarded
 from hecbench_hardware.options import number, text
 
 PORT = 63352
@@ -26,17 +27,23 @@ FORCE_N = (20.0, 235.0)
 """Grip forces of FOR 0 and 255."""
 _ACTIVE, _MOVING, _HOLDING = 3, 0, (1, 2)
 _POLL_S = 0.01
+_ACKNOWLEDGED = b"ack"
+"""The answer to SET, which has no newline."""
+_ANSWER_BYTES = 1024
 
 
 @dataclass
-class RobotiqGripper:
-    """Connected and activated. A command that does not end within `timeout_s` is a fault."""
+class RobotiqGripper(Guarded):
+    """Connected; `enable` activates it, which can move the fingers.
+
+    A command that does not end within `timeout_s` is a fault.
+    """
 
     host: str
     timeout_s: float = 5.0
 
     def __post_init__(self) -> None:
-        """Connect and activate."""
+        """Connect."""
         self.name = f"gripper {self.host}"
         try:
             self._socket = socket.create_connection((self.host, PORT), self.timeout_s)
@@ -45,12 +52,12 @@ class RobotiqGripper:
                 f"port {PORT} does not answer ({error.strerror or 'time-out'}), is the Robotiq URCap there"
             )
             raise DeviceFault(Fault.GRIPPER, self.name, detail) from None
-        try:
-            self._command("SET ACT 1 GTO 1")
-            self._wait(lambda: self._get("STA") == _ACTIVE, "it does not become active")
-        except BaseException:
-            self.close()
-            raise
+
+    def enable(self) -> None:
+        """Activate."""
+        self._command("SET ACT 1 GTO 1")
+        self._wait(lambda: self._get("STA") == _ACTIVE, "it does not become active")
+        super().enable()
 
     def open_fingers(self, width_m: float | None = None) -> None:
         """Open fully, or to a width in metres."""
@@ -77,13 +84,15 @@ class RobotiqGripper:
 
     def stop(self) -> None:
         """Hold the fingers where they are."""
-        self._command("SET GTO 0")
+        if self.enabled:
+            self._command("SET GTO 0")
 
     def close(self) -> None:
         """Disconnect."""
         self._socket.close()
 
     def _go(self, position: int, force_n: float) -> None:
+        self.refuse_disabled()
         force = round(255 * (force_n - FORCE_N[0]) / (FORCE_N[1] - FORCE_N[0]))
         self._command(f"SET POS {position} SPE 255 FOR {force} GTO 1")
         self._wait(
@@ -95,7 +104,7 @@ class RobotiqGripper:
         while not done():
             if time.monotonic() > deadline:
                 with contextlib.suppress(DeviceFault):
-                    self.stop()
+                    self._command("SET GTO 0")
                 raise DeviceFault(Fault.GRIPPER, self.name, f"{complaint} within {self.timeout_s:.1f} s")
             time.sleep(_POLL_S)
 
@@ -106,13 +115,20 @@ class RobotiqGripper:
         return int(answer[1])
 
     def _command(self, line: str) -> None:
-        if self._exchange(line) != "ack":
+        if self._exchange(line) != _ACKNOWLEDGED.decode():
             raise DeviceFault(Fault.GRIPPER, self.name, f"'{line}' was not acknowledged")
 
     def _exchange(self, line: str) -> str:
+        """Send a line and return its whole answer, in however many pieces it comes: `ack`, or a line."""
+        answer = b""
         try:
             self._socket.sendall(f"{line}\n".encode())
-            return self._socket.recv(1024).decode(errors="replace").strip()
+            while answer != _ACKNOWLEDGED and not answer.endswith(b"\n") and len(answer) < _ANSWER_BYTES:
+                piece = self._socket.recv(_ANSWER_BYTES)
+                if not piece:
+                    raise ConnectionResetError(None, "connection closed")
+                answer += piece
+            return answer.decode(errors="replace").strip()
         except OSError as error:
             detail = f"no answer to '{line}' ({error.strerror or 'time-out'})"
             raise DeviceFault(Fault.GRIPPER, self.name, detail) from None

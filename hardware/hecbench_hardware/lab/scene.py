@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.recording import CameraModel
-from hecbench.robot import RobotModel
+from hecbench.robots.model import RobotModel
 from hecbench.se3 import Array
 from hecbench.targets import AprilTagTarget
 from hecbench_hardware.lab import tag

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.recording import Recording, RobotDescription
-from hecbench.recording_io import save
 from hecbench.se3 import Array
+from hecbench.storage.recording_io import save
 from hecbench_hardware.devices import Camera, DeviceFault, Fault, Robot, RobotState
 from hecbench_hardware.kinematics import JOINT_NAMES
 from hecbench_hardware.recorder.plan import planned_joints

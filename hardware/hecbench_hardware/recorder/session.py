@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from hecbench import files
 from hecbench.errors import HecbenchError, InputError
-from hecbench.recording_io import encode_png
+from hecbench.storage.recording_io import encode_png
 
 FILE_NAME = "session.jsonl"
 PLAN_NAME = "plan.json"

@@ -8,11 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from hecbench import estimate as estimates
-from hecbench import se3, store
+from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.estimate import Estimate, Status
 from hecbench.recording import CameraModel, Mounting
 from hecbench.se3 import Array
+from hecbench.storage import store
 from hecbench_hardware.trials import solids, tasks
 from hecbench_hardware.trials.cell import Calibration
 from hecbench_hardware.trials.tasks import Task

@@ -7,11 +7,12 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from hecbench import registry, trial_record
+from hecbench import registry
 from hecbench.errors import InputError
-from hecbench.journal import Writer
 from hecbench.registry import TrialObserver
-from hecbench.trial_record import Contents, Outcome, TrialRecord
+from hecbench.storage import trial_record
+from hecbench.storage.journal import Writer
+from hecbench.storage.trial_record import Contents, Outcome, TrialRecord
 from hecbench_hardware.devices import DeviceFault
 from hecbench_hardware.trials import solids
 from hecbench_hardware.trials.cell import Calibration, TrialCell

@@ -145,7 +145,7 @@ def _calibrated(
 
 def _turn(recording: Recording, shape: tuple[int, int]) -> tuple[Recording, str]:
     """Read each board from the end that the hand motion demands."""
-    from hecbench_plugins.target_poses import planar_candidates
+    from hecbench_plugins.markers.target_poses import planar_candidates
 
     corners = recording.corners_px
     assert corners is not None

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from hecbench import files
 from hecbench.recording import Recording
-from hecbench.recording_io import encode_png
+from hecbench.storage.recording_io import encode_png
 
 Picture = NDArray[np.uint8]
 

@@ -11,8 +11,8 @@ from hecbench import se3
 from hecbench.estimate import Estimate
 from hecbench.recording import CameraModel, Recording
 from hecbench.registry import hookimpl
-from hecbench.specs import Column, EvaluatorSpec, Into, Need
-from hecbench_plugins.hand_eye import PosePairs, other_T_target_per_sample, rotation_spread_deg
+from hecbench.specs import Column, EvaluatorSpec, Need, ResultSection
+from hecbench_plugins.markers.hand_eye import PosedSamples, carrier_T_target_per_sample, rotation_spread_deg
 
 Array = NDArray[np.float64]
 
@@ -36,7 +36,7 @@ def consistency(
     assert recording.camera_T_target is not None
     hand = recording.hand_poses()
     usable = np.isfinite(hand).all((1, 2)) & np.isfinite(recording.camera_T_target).all((1, 2))
-    targets = other_T_target_per_sample(PosePairs(hand[usable], recording.camera_T_target[usable]), X)
+    targets = carrier_T_target_per_sample(PosedSamples(hand[usable], recording.camera_T_target[usable]), X)
     offsets = targets[:, :3, 3] - targets[:, :3, 3].mean(0)
     found = {
         "target_spread_deg": rotation_spread_deg(targets[:, :3, :3]),
@@ -117,7 +117,7 @@ def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
             Column("rae_mean_square_mm2", "mm2"),
         ),
         factory=lambda: consistency,
-        into=Into.DIAGNOSTICS,
+        into=ResultSection.DIAGNOSTICS,
         applies=lambda recording: (
             recording.camera_T_target is not None and recording.base_T_flange is not None
         ),

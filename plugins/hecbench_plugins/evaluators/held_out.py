@@ -13,8 +13,8 @@ from hecbench import se3, statistics
 from hecbench.estimate import Estimate, Status
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
-from hecbench.specs import Column, EvaluatorSpec, Into, Need
-from hecbench_plugins.target_poses import project
+from hecbench.specs import Column, EvaluatorSpec, Need, ResultSection
+from hecbench_plugins.markers.target_poses import project
 
 Array = NDArray[np.float64]
 
@@ -31,7 +31,7 @@ def held_out(
 ) -> Mapping[str, Any]:
     """Prediction of left-out samples, 5-fold by sample, rms with its bootstrap interval, and the median.
 
-    X is the solver's on the training folds. The ruler itself refits Y = other_T_target there with the raw
+    X is the solver's on the training folds. The ruler itself refits Y = carrier_T_target there with the raw
     robot poses, identically for every solver, and predicts ``inverse(X) @ H @ Y`` for the left-out samples. A
     fold on which the solver gives no answer is counted in `failed_folds` and predicts nothing. Pixels are predicted
     with the camera of the estimate: the recording's, unless the solver calibrates intrinsics too.
@@ -52,8 +52,8 @@ def held_out(
             continue
         assert fitted.parent_T_camera is not None
         seen_by = replace(recording, camera=fitted.camera or recording.camera)
-        other_T_target = refit_target(fitted.parent_T_camera, seen_by.subset(training))
-        residuals += [_residuals(fitted.parent_T_camera, other_T_target, seen_by, i) for i in fold.tolist()]
+        carrier_T_target = refit_target(fitted.parent_T_camera, seen_by.subset(training))
+        residuals += [_residuals(fitted.parent_T_camera, carrier_T_target, seen_by, i) for i in fold.tolist()]
     found: dict[str, Any] = {"folds": len(folds), "failed_folds": failed, "samples": len(residuals)}
     for name, values in zip(
         ("reprojection_px", "target_mm", "target_deg"), np.array(residuals).T, strict=False
@@ -96,10 +96,10 @@ def _has_pixels(recording: Recording) -> bool:
     return {Need.CORNERS, Need.INTRINSICS} <= recording.offers()
 
 
-def _residuals(parent_T_camera: Array, other_T_target: Array, recording: Recording, i: int) -> Array:
+def _residuals(parent_T_camera: Array, carrier_T_target: Array, recording: Recording, i: int) -> Array:
     """[rms px or NaN, mm, deg] of one sample."""
     assert recording.camera_T_target is not None
-    predicted = se3.inverse(parent_T_camera) @ recording.hand_poses()[i] @ other_T_target
+    predicted = se3.inverse(parent_T_camera) @ recording.hand_poses()[i] @ carrier_T_target
     observed = recording.camera_T_target[i]
     pixels = np.nan
     if _has_pixels(recording):
@@ -121,7 +121,7 @@ def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
         summary="prediction of left-out samples",
         columns=_COLUMNS,
         factory=lambda: held_out,
-        into=Into.HELD_OUT,
+        into=ResultSection.HELD_OUT,
         applies=lambda recording: (
             recording.camera_T_target is not None and recording.base_T_flange is not None
         ),

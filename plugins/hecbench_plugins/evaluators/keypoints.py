@@ -18,10 +18,10 @@ from hecbench import se3
 from hecbench.estimate import Estimate
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
-from hecbench.robot import load_robot
-from hecbench.specs import Column, EvaluatorSpec, Into, Need
+from hecbench.robots.posed import PosedRobot
+from hecbench.specs import Column, EvaluatorSpec, Need, ResultSection
 from hecbench.targets import PointsTarget
-from hecbench_plugins.target_poses import MINIMUM_POINTS, project
+from hecbench_plugins.markers.target_poses import MINIMUM_POINTS, project
 
 Array = NDArray[np.float64]
 
@@ -32,7 +32,7 @@ _AREA_PX, _BAXTER_AREA_MM, _DREAM_AREA_MM = 200, 400, 100
 def has_keypoints(recording: Recording) -> bool:
     """Whether the target is points on the flange (or the base, eye in hand) that no method can take a pose from.
 
-    Their frame is that link's: other_T_target is the identity. Four points or more would be a target to calibrate by.
+    Their frame is that link's: carrier_T_target is the identity. Four points or more would be a target to calibrate by.
     """
     target = recording.target
     return (
@@ -118,15 +118,11 @@ def links_add(
     rng: np.random.Generator,
 ) -> Mapping[str, float]:
     """The same of the origins of the links: the base, those behind each joint, the flange; area to 0.1 m."""
-    robot, joints = recording.robot, recording.joints_rad
-    assert robot is not None
-    assert joints is not None
-    model = load_robot(robot.urdf or str(robot.model), meshes=False)
-    names = robot.joint_names or model.joint_names
-    behind = {joint.child for joint in model.joints if joint.name in names}
+    robot = PosedRobot.of(recording, meshes=False)
+    behind = {joint.child for joint in robot.model.joints if joint.name in robot.joint_names}
     links = sorted({robot.base_link, robot.flange_link, *behind})
-    poses = model.link_poses(joints[np.isfinite(joints).all(1)], names, frame=recording.parent_link)
-    points = poses[:, [model.link_index(link) for link in links], :3, 3]
+    poses = robot.link_poses(robot.joints_rad[robot.samples])
+    points = poses[:, [robot.model.link_index(link) for link in links], :3, 3]
     distances_mm = distances_to_truth_mm(estimate, recording, points)
     return {
         "links_add_mm": float(distances_mm.mean()),
@@ -160,7 +156,7 @@ def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
             *(Column(f"pck_{threshold}_px", "", False) for threshold in THRESHOLDS_PX),
         ),
         factory=lambda: pck,
-        into=Into.DIAGNOSTICS,
+        into=ResultSection.DIAGNOSTICS,
         applies=has_keypoints,
     )
     yield EvaluatorSpec(
@@ -168,7 +164,7 @@ def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
         summary="keypoints of the robot away from where the truth has them (ADD)",
         columns=(Column("add_mm", "mm"), Column("add_auc_400_mm", "", False)),
         factory=lambda: add,
-        into=Into.ERRORS,
+        into=ResultSection.ERRORS,
         applies=lambda recording: recording.truth_parent_T_camera is not None and has_keypoints(recording),
     )
     yield EvaluatorSpec(
@@ -176,7 +172,7 @@ def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
         summary="origins of the robot's links away from where the truth has them (ADD)",
         columns=(Column("links_add_mm", "mm"), Column("links_add_auc_100_mm", "", False)),
         factory=lambda: links_add,
-        into=Into.ERRORS,
+        into=ResultSection.ERRORS,
         applies=lambda recording: (
             recording.truth_parent_T_camera is not None
             and {Need.JOINTS, Need.ROBOT_MODEL} <= recording.offers()

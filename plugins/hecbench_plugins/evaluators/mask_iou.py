@@ -16,8 +16,8 @@ from hecbench import statistics
 from hecbench.estimate import Estimate, Status
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
-from hecbench.specs import Column, EvaluatorSpec, Into, Need
-from hecbench_plugins.silhouettes import Silhouettes
+from hecbench.specs import Column, EvaluatorSpec, Need, ResultSection
+from hecbench_plugins.views.silhouettes import Silhouettes
 
 Array = NDArray[np.float64]
 
@@ -115,7 +115,7 @@ def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
         summary="overlap of the robot drawn at the answer with the masks",
         columns=(Column("mask_iou", "", False), Column("mask_iou_least", "", False)),
         factory=lambda: of_answer,
-        into=Into.DIAGNOSTICS,
+        into=ResultSection.DIAGNOSTICS,
         applies=_drawable,
     )
     yield EvaluatorSpec(
@@ -123,7 +123,7 @@ def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
         summary="overlap of the robot drawn in left-out views with their masks, where there is no target",
         columns=(Column("mask_iou", "", False),),
         factory=lambda: of_left_out_views,
-        into=Into.HELD_OUT,
+        into=ResultSection.HELD_OUT,
         applies=lambda recording: (
             recording.camera_T_target is None and _drawable(recording) and len(masked_samples(recording)) > 1
         ),
@@ -133,6 +133,6 @@ def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
         summary="overlap of the masks with the robot drawn at the true camera pose",
         columns=(Column("masks_iou_truth", "", False),),
         factory=lambda: of_masks,
-        into=Into.ERRORS,
+        into=ResultSection.ERRORS,
         applies=lambda recording: recording.truth_parent_T_camera is not None and _drawable(recording),
     )

@@ -11,7 +11,7 @@ from hecbench import se3
 from hecbench.estimate import Estimate
 from hecbench.recording import Mounting, Recording
 from hecbench.registry import hookimpl
-from hecbench.specs import Column, EvaluatorSpec, Into
+from hecbench.specs import Column, EvaluatorSpec, ResultSection
 from hecbench.workspace import cube_corners
 
 Array = NDArray[np.float64]
@@ -68,6 +68,6 @@ def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
             Column("tre_mm", "mm"),
         ),
         factory=lambda: errors,
-        into=Into.ERRORS,
+        into=ResultSection.ERRORS,
         applies=lambda recording: recording.truth_parent_T_camera is not None,
     )

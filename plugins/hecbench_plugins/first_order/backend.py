@@ -9,7 +9,7 @@ import numpy as np
 
 from hecbench.rendering import RenderMesh
 from hecbench_plugins.first_order.drawing import CpuDrawer, Drawer
-from hecbench_plugins.render_views import Picture, View
+from hecbench_plugins.views.pyramid import Picture, View
 
 Backend = Literal["cpu", "nvdiffrast"]
 

@@ -15,13 +15,13 @@ from torch import Tensor
 from hecbench import se3
 from hecbench.errors import SolverFailure
 from hecbench.estimate import Estimate, Status, Termination
-from hecbench_plugins import render_evidence as evidence
-from hecbench_plugins import render_stages as stages
 from hecbench_plugins.first_order.adam import Adam
 from hecbench_plugins.first_order.drawing import Drawer
 from hecbench_plugins.first_order.poses import PoseNumbers
 from hecbench_plugins.first_order.rendered import rendered
-from hecbench_plugins.render_views import View
+from hecbench_plugins.second_order import evidence
+from hecbench_plugins.second_order.descent import Trace
+from hecbench_plugins.views.pyramid import View
 
 Array = NDArray[np.float64]
 
@@ -66,7 +66,7 @@ class AdamSettings:
 
 
 @dataclass
-class Run:
+class DescentHistory:
     """What happened. Poses are camera_T_parent."""
 
     last: Array
@@ -93,8 +93,8 @@ class Run:
 
 def descend(
     drawers: Sequence[Drawer], numbers: PoseNumbers, objective: Objective, settings: AdamSettings
-) -> Run:
-    """Run all iterations, or until the robot has left every picture.
+) -> DescentHistory:
+    """DescentHistory all iterations, or until the robot has left every picture.
 
     Raises:
         SolverFailure: the loss or its derivative is not finite.
@@ -106,7 +106,7 @@ def descend(
         torch.from_numpy(translation.values).requires_grad_(),
         torch.from_numpy(rotation.values).requires_grad_(),
     )
-    run = Run(last=numbers.pose(translation.values, rotation.values))
+    run = DescentHistory(last=numbers.pose(translation.values, rotation.values))
     every = max(1, settings.iterations // (_TOLD_STEPS - 2))
     turned = True
     with _one_thread():
@@ -134,7 +134,7 @@ def descend(
     return run
 
 
-def _check(run: Run, *slopes: Array) -> None:
+def _check(run: DescentHistory, *slopes: Array) -> None:
     """Raises SolverFailure when the loss or one of its slopes is not finite."""
     if not np.isfinite([run.loss, *(slope.sum() for slope in slopes)]).all():
         raise SolverFailure(
@@ -155,7 +155,11 @@ def _one_thread() -> Iterator[None]:
 
 
 def answer(
-    run: Run, views: Sequence[View], drawers: Sequence[Drawer], pose: Array, diagnostics: Mapping[str, Any]
+    run: DescentHistory,
+    views: Sequence[View],
+    drawers: Sequence[Drawer],
+    pose: Array,
+    diagnostics: Mapping[str, Any],
 ) -> Estimate:
     """The estimate of a run: its answer is `pose`, camera_T_parent, the last iterate or the best.
 
@@ -183,7 +187,7 @@ def answer(
             renders=renders,
             diagnostics=told,
         )
-    told["overlap"] = evidence.overlap(views, pose, stages.Trace())
+    told["overlap"] = evidence.overlap(views, pose, Trace())
     if pose is run.best:
         told["best_iteration"] = run.best_iteration
         told["last_parent_T_camera"] = se3.inverse(run.last)

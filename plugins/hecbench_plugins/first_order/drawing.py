@@ -6,16 +6,15 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from pathlib import Path
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench.recording import Recording
 from hecbench.rendering import Renderer, RenderMesh
+from hecbench.robots.model import RobotModel
 from hecbench_plugins.first_order import kernels
-from hecbench_plugins.render_views import View, robot_and_meshes
+from hecbench_plugins.views.pyramid import View, meshes_by_level
 
 Array = NDArray[np.float64]
 Picture = NDArray[np.float32]
@@ -157,22 +156,15 @@ class BoxSum:
         )
 
 
-def robot_name(recording: Recording) -> str | Path:
-    """What `robot_and_meshes` takes."""
-    assert recording.robot is not None
-    return recording.robot.urdf or str(recording.robot.model)
-
-
 @lru_cache(maxsize=4)
-def whole_mask_mesh(name: str | Path) -> RenderMesh:
+def whole_mask_mesh(model: RobotModel) -> RenderMesh:
     """The robot as a single part."""
-    return _one_part(robot_and_meshes(name)[1][1])
+    return _one_part(meshes_by_level(model)[1])
 
 
 @lru_cache(maxsize=4)
-def link_mask_meshes(name: str | Path) -> tuple[RenderMesh, ...]:
+def link_mask_meshes(model: RobotModel) -> tuple[RenderMesh, ...]:
     """Every link that can be seen, as a robot of its own and a single part."""
-    model = robot_and_meshes(name)[0]
     seen = dict.fromkeys(part.link for part in model.parts)
     return tuple(
         _one_part(RenderMesh.of(replace(model, parts=tuple(p for p in model.parts if p.link == link))))

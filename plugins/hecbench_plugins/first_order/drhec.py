@@ -30,13 +30,13 @@ from hecbench.estimate import Estimate
 from hecbench.recording import Recording
 from hecbench.specs import Kind, Translator, TranslatorSpec
 from hecbench_plugins.first_order.backend import Backend, drawer
-from hecbench_plugins.first_order.descent import AdamSettings, Run, Verdict, answer, descend
+from hecbench_plugins.first_order.descent import AdamSettings, DescentHistory, Verdict, answer, descend
 from hecbench_plugins.first_order.drawing import Drawer
 from hecbench_plugins.first_order.losses import SquaredError, geometry, geometry_of
 from hecbench_plugins.first_order.masks import mask_of
 from hecbench_plugins.first_order.poses import EulerAngles, Increment, PoseNumbers
 from hecbench_plugins.first_order.simlike import cut_out, why_not_simulated
-from hecbench_plugins.render_views import Picture, View, prepare
+from hecbench_plugins.views.pyramid import Picture, View, prepare
 
 Array = NDArray[np.float64]
 
@@ -112,7 +112,9 @@ class DRHeC:
         pose = run.last if literal or run.best is None else run.best
         return answer(run, views, drawers, pose, self._told(run, views, pose, objective))
 
-    def _told(self, run: Run, views: Sequence[View], pose: Array, objective: _Objective) -> dict[str, Any]:
+    def _told(
+        self, run: DescentHistory, views: Sequence[View], pose: Array, objective: _Objective
+    ) -> dict[str, Any]:
         told: dict[str, Any] = {
             "variant": str(self.variant),
             "translator": self.translator,

@@ -25,7 +25,7 @@ from hecbench_plugins.first_order.hemisphere import best_on_hemisphere
 from hecbench_plugins.first_order.losses import SquaredError
 from hecbench_plugins.first_order.masks import MaskMode, mask_drawers, mask_of
 from hecbench_plugins.first_order.poses import LogVector
-from hecbench_plugins.render_views import prepare
+from hecbench_plugins.views.pyramid import prepare
 
 Array = NDArray[np.float64]
 
@@ -51,7 +51,7 @@ class EasyHeC:
 
     def __call__(self, recording: Recording, *, rng: np.random.Generator) -> Estimate:
         """Calibrate from the recording's start, or from a searched one."""
-        _, views = prepare(recording)
+        robot, views = prepare(recording)
         told: dict[str, Any] = {"masks": self.masks}
         if self.search_start:
             found = best_on_hemisphere(recording, views)
@@ -63,7 +63,7 @@ class EasyHeC:
             )
         else:
             start = se3.inverse(recording.initial_parent_T_camera)
-        drawers = mask_drawers(recording, views, self.masks, self.backend)
+        drawers = mask_drawers(robot.model, views, self.masks, self.backend)
         ceiling = 1.0 if self.masks == "per_link" else np.inf
         errors = [
             SquaredError(mask_of(view)[None], drawer, ceiling)

@@ -16,8 +16,9 @@ from numpy.typing import NDArray
 from hecbench import se3
 from hecbench.errors import Refusal
 from hecbench.recording import Mounting, Recording
-from hecbench_plugins import render_stages as stages
-from hecbench_plugins.render_views import View
+from hecbench_plugins.second_order.descent import Trace, draw_counted
+from hecbench_plugins.second_order.silhouette import centroid_and_area
+from hecbench_plugins.views.pyramid import View
 
 Array = NDArray[np.float64]
 
@@ -47,10 +48,10 @@ def best_on_hemisphere(recording: Recording, views: Sequence[View]) -> Hemispher
     if recording.mounting is not Mounting.EYE_TO_HAND:
         raise Refusal("cameras are sampled around the base: a start can be searched for eye_to_hand only")
     middle = np.concatenate([view.parent_T_link[:, :3, 3] for view in views]).mean(0)
-    best, best_overlap, trace = np.eye(4), -1.0, stages.Trace()
+    best, best_overlap, trace = np.eye(4), -1.0, Trace()
     for direction in _directions():
         pose = _looking_at(middle, direction)
-        pose = stages.centroid_and_area(views, pose, trace, rounds=_ROUNDS)
+        pose = centroid_and_area(views, pose, trace, rounds=_ROUNDS)
         overlap = _overlap(views, pose, trace)
         if overlap > best_overlap:
             best, best_overlap = pose, overlap
@@ -75,10 +76,10 @@ def _looking_at(middle: Array, direction: Array) -> Array:
     return se3.make(camera_R_parent, -camera_R_parent @ eye)
 
 
-def _overlap(views: Sequence[View], pose: Array, trace: stages.Trace) -> float:
+def _overlap(views: Sequence[View], pose: Array, trace: Trace) -> float:
     values = []
     for view in views:
-        at = stages.draw(view, _LEVEL, pose, trace)
+        at = draw_counted(view, _LEVEL, pose, trace)
         drawn, seen = at.drawn(), at.observed[..., 3] > 0.5
         values.append((drawn & seen).sum() / max((drawn | seen).sum(), 1))
     return float(np.mean(values))

@@ -30,7 +30,7 @@ from hecbench_plugins.first_order.drawing import Drawer
 from hecbench_plugins.first_order.losses import SquaredError
 from hecbench_plugins.first_order.masks import mask_drawers, mask_of
 from hecbench_plugins.first_order.poses import Increment, PoseNumbers
-from hecbench_plugins.render_views import Picture, prepare
+from hecbench_plugins.views.pyramid import Picture, prepare
 
 Array = NDArray[np.float64]
 
@@ -56,8 +56,8 @@ class IPE:
         """Calibrate from the recording's start."""
         if recording.initial_parent_T_camera is None:
             raise Refusal("ipe needs a start: initial_parent_T_camera, or --init FILE")
-        _, views = prepare(recording)
-        drawers = mask_drawers(recording, views, "zbuffered", self.backend)
+        robot, views = prepare(recording)
+        drawers = mask_drawers(robot.model, views, "zbuffered", self.backend)
         numbers = Increment(se3.inverse(recording.initial_parent_T_camera))
         losses = _Losses([mask_of(view) for view in views], drawers, numbers, self.gamma)
         run = descend(drawers, numbers, losses, AdamSettings(self.iterations, _RATE))

@@ -5,26 +5,22 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Literal
 
-from hecbench.recording import Recording
+from hecbench.robots.model import RobotModel
 from hecbench_plugins.first_order.backend import Backend, drawer
 from hecbench_plugins.first_order.drawing import (
     MASK,
     Drawer,
     link_mask_meshes,
-    robot_name,
     whole_mask_mesh,
 )
-from hecbench_plugins.render_views import Picture, View
+from hecbench_plugins.views.pyramid import Picture, View
 
 MaskMode = Literal["zbuffered", "per_link"]
 
 
-def mask_drawers(
-    recording: Recording, views: Sequence[View], mode: MaskMode, backend: Backend
-) -> list[Drawer]:
+def mask_drawers(model: RobotModel, views: Sequence[View], mode: MaskMode, backend: Backend) -> list[Drawer]:
     """Drawers of the robot's mask: one z-buffered picture, or the links' masks added up."""
-    name = robot_name(recording)
-    meshes = (whole_mask_mesh(name),) if mode == "zbuffered" else link_mask_meshes(name)
+    meshes = (whole_mask_mesh(model),) if mode == "zbuffered" else link_mask_meshes(model)
     return [drawer(backend, meshes, MASK, view) for view in views]
 
 

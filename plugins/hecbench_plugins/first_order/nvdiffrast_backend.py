@@ -20,7 +20,7 @@ from torch import Tensor
 from hecbench.errors import Refusal
 from hecbench.rendering import RenderMesh
 from hecbench_plugins.first_order.drawing import Box
-from hecbench_plugins.render_views import Picture, View
+from hecbench_plugins.views.pyramid import Picture, View
 
 Array = NDArray[np.float64]
 

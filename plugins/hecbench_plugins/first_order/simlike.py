@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench_plugins.render_views import Picture, View
+from hecbench_plugins.views.pyramid import Picture, View
 
 Array = NDArray[np.float64]
 

@@ -18,9 +18,11 @@ from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.rendering import Renderer, RenderMesh
-from hecbench_plugins import scene_background, threads
+from hecbench.rendering.undistort import shrunk_intrinsics
+from hecbench_plugins import threads
 from hecbench_plugins.maskless import kernels
-from hecbench_plugins.maskless.canvas import Canvas, Images, shrunk_intrinsics
+from hecbench_plugins.views import scene_background
+from hecbench_plugins.views.canvas import Canvas, Images
 
 Array = NDArray[np.float64]
 Bits = NDArray[np.bool_]
@@ -57,7 +59,7 @@ class Background:
 
 
 @dataclass(frozen=True)
-class Step:
+class RefinementLevel:
     """A round of refinement: canvas pixels per pixel, pixels between samples, iterations, and with which background."""
 
     level: int
@@ -66,19 +68,19 @@ class Step:
     background: bool
 
 
-def schedule(width_px: int) -> tuple[tuple[Step, ...], Step]:
+def schedule(width_px: int) -> tuple[tuple[RefinementLevel, ...], RefinementLevel]:
     """The steps from a start decimetres away, and the last one, for a canvas of this width."""
     coarsest = 1
     while width_px / coarsest > _COARSEST_PX:
         coarsest *= 2
-    steps = [Step(coarsest, 4, 8, True), Step(coarsest, 2, 6, True)]
+    steps = [RefinementLevel(coarsest, 4, 8, True), RefinementLevel(coarsest, 2, 6, True)]
     level = coarsest // 2
     while level > 1:
-        steps += [Step(level, 2, 4, True), Step(level, 1, 5, True)]
+        steps += [RefinementLevel(level, 2, 4, True), RefinementLevel(level, 1, 5, True)]
         level //= 2
     if coarsest <= 2:
-        steps.append(Step(1, 2, 4, True))
-    return tuple(steps), Step(1, 1, 15, False)
+        steps.append(RefinementLevel(1, 2, 4, True))
+    return tuple(steps), RefinementLevel(1, 1, 15, False)
 
 
 class _Buffers:
@@ -96,7 +98,7 @@ class _Buffers:
 
 
 @dataclass(frozen=True, eq=False)
-class Round:
+class ContourEquations:
     """The normal equations of one pose: sums, per-view gradients, and how well the lines agree with the contour."""
 
     A: Array
@@ -105,19 +107,19 @@ class Round:
     view_b: Array
     squares: float
     points: int
-    view_sharp: Array
+    view_confirmed_share: Array
     """(N,) share of each view's contour points whose posterior is narrow and centred."""
     view_judged: NDArray[np.int64]
     """(N,) contour points of each view that the image could judge."""
 
     @property
-    def sharp(self) -> float:
+    def confirmed_share(self) -> float:
         """Share of all judged contour points that the images confirm."""
-        return float(self.view_sharp @ self.view_judged / max(self.view_judged.sum(), 1))
+        return float(self.view_confirmed_share @ self.view_judged / max(self.view_judged.sum(), 1))
 
 
 @dataclass(eq=False)
-class Lines:
+class ContourMatcher:
     """All views of a canvas at one size; remembers the colours found at the last pose it was asked about.
 
     Attributes:
@@ -159,7 +161,7 @@ class Lines:
         if self.background is not None:
             self._background = np.ascontiguousarray(small(self.background.image), np.uint8)
             self._agreement = np.ascontiguousarray(small(self.background.agreement), np.float32)
-        K = shrunk_intrinsics(self.canvas.K, 1 / self.level, 1 / self.level)
+        K = shrunk_intrinsics(self.canvas.K, 1 / self.level)
         _, material = np.unique(self.mesh.colours.round(3), axis=0, return_inverse=True)
         self._material = material.reshape(-1).astype(np.int64)
         size, parts = kernels.BINS**3, len(self.mesh.part_names)
@@ -179,7 +181,7 @@ class Lines:
         *,
         twists: Sequence[Array] = (),
         radius_m: float = 0.0,
-    ) -> Round:
+    ) -> ContourEquations:
         """Compare the contours drawn at a pose with the images by the known colours; learns those of this pose.
 
         Args:
@@ -196,7 +198,9 @@ class Lines:
             lambda buffers, view, count: self._compared(buffers, view, count, spacing, extra[view]),
         )
         A, b, squares, used, sharp, judged = (np.array(column) for column in zip(*rows, strict=True))
-        return Round(A.sum(0), b.sum(0), A, b, float(squares.sum()), int(used.sum()), sharp, judged)
+        return ContourEquations(
+            A.sum(0), b.sum(0), A, b, float(squares.sum()), int(used.sum()), sharp, judged
+        )
 
     def learn(self, camera_T_parent: Array, spacing: float) -> None:
         """Find the colours of the parts and of what is around them at a pose (4, 4)."""
@@ -334,12 +338,14 @@ class Refined:
     """Where a refinement ended, with the comparison there."""
 
     camera_T_parent: Array
-    last: Round
+    last: ContourEquations
     iterations: int
     converged: bool
 
 
-def refine(lines: Lines, camera_T_parent: Array, step: Step, radius_m: float = 0.0) -> Refined:
+def refine(
+    lines: ContourMatcher, camera_T_parent: Array, step: RefinementLevel, radius_m: float = 0.0
+) -> Refined:
     """Damped Gauss-Newton steps of limited length at one size."""
     pose, converged, iteration = camera_T_parent, False, 0
     lines.learn(pose, step.spacing)
@@ -356,7 +362,7 @@ def refine(lines: Lines, camera_T_parent: Array, step: Step, radius_m: float = 0
     return Refined(pose, found, iteration, converged)
 
 
-def settled(found: Round, move: NDArray[Any]) -> bool:
+def settled(found: ContourEquations, move: NDArray[Any]) -> bool:
     """Whether a move (6 + ...) is small against what the images can tell."""
     return float(move @ found.A @ move) < CORRELATED_POINTS * _SETTLED**2
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.estimate import Estimate, Termination
-from hecbench_plugins.maskless.align import CORRELATED_POINTS, Refined, Round
+from hecbench_plugins.maskless.align import CORRELATED_POINTS, ContourEquations, Refined
 
 Array = NDArray[np.float64]
 
@@ -19,7 +19,7 @@ _DOUBTFUL = 0.5
 """Of the median share of confirmed contour: a photograph with less disagrees with the others."""
 
 
-def covariance(camera_T_parent: Array, last: Round, prior: Array) -> Array:
+def covariance(camera_T_parent: Array, last: ContourEquations, prior: Array) -> Array:
     """(6, 6) of parent_T_camera's left perturbation, the joints being off by constants that nobody knows.
 
     Contour points are correlated along the contour and share what is wrong with their photograph, so the information
@@ -57,7 +57,10 @@ def answer(
 ) -> Estimate:
     """The estimate with its evidence."""
     last = end.last
-    shares = {name: round(float(share), 3) for name, share in zip(sample_ids, last.view_sharp, strict=True)}
+    shares = {
+        name: round(float(share), 3)
+        for name, share in zip(sample_ids, last.view_confirmed_share, strict=True)
+    }
     return Estimate(
         se3.inverse(end.camera_T_parent),
         covariance=covariance,
@@ -67,10 +70,12 @@ def answer(
         diagnostics={
             "stage": "maskless",
             **diagnostics,
-            "confirmed_at_end": last.sharp,
+            "confirmed_at_end": last.confirmed_share,
             "confirmed_by_sample": shares,
             "doubtful_samples": [
-                name for name, share in shares.items() if share < _DOUBTFUL * np.median(last.view_sharp)
+                name
+                for name, share in shares.items()
+                if share < _DOUBTFUL * np.median(last.view_confirmed_share)
             ],
             "path": [
                 [stage, None, se3.log(se3.inverse(pose)).round(6).tolist()]

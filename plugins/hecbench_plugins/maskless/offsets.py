@@ -9,18 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
+from hecbench.robots.posed import PosedRobot
 from hecbench_plugins.maskless.align import (
     CORRELATED_POINTS,
     FEWEST_POINTS,
-    Lines,
+    ContourEquations,
+    ContourMatcher,
     Refined,
-    Round,
-    Step,
+    RefinementLevel,
     limited,
     settled,
 )
-from hecbench_plugins.render_unknowns import told
-from hecbench_plugins.render_views import Kinematics
+from hecbench_plugins.second_order.unknowns import told
 
 Array = NDArray[np.float64]
 
@@ -37,24 +37,29 @@ class Offsets:
 
 
 def compare(
-    lines: Lines, camera_T_parent: Array, kinematics: Kinematics, offsets: Array, step: Step, radius_m: float
-) -> Round:
+    lines: ContourMatcher,
+    camera_T_parent: Array,
+    robot: PosedRobot,
+    offsets: Array,
+    step: RefinementLevel,
+    radius_m: float,
+) -> ContourEquations:
     """The comparison at a pose and joint offsets (J,) rad, with a column of the normal equations for each joint."""
     joints = lines.canvas.joints_rad + offsets
-    lines.parent_T_link = kinematics(joints)
-    twists = kinematics.twists(joints) @ se3.adjoint(camera_T_parent).T
+    lines.parent_T_link = robot.clipped_link_poses(joints)
+    twists = robot.twists(joints) @ se3.adjoint(camera_T_parent).T
     return lines(camera_T_parent, step.spacing, twists=list(twists), radius_m=radius_m)
 
 
 def with_joint_offsets(
-    lines: Lines, camera_T_parent: Array, kinematics: Kinematics, step: Step, radius_m: float
+    lines: ContourMatcher, camera_T_parent: Array, robot: PosedRobot, step: RefinementLevel, radius_m: float
 ) -> Offsets:
     """Gauss-Newton over the camera and one offset per joint, the prior weighed as the correlated points it equals."""
     offsets = np.zeros(lines.canvas.joints_rad.shape[1])
     pose, converged, iteration = camera_T_parent, False, 0
     prior = CORRELATED_POINTS * prior_information(len(offsets))
     lines.learn(pose, step.spacing)
-    found = compare(lines, pose, kinematics, offsets, step, radius_m)
+    found = compare(lines, pose, robot, offsets, step, radius_m)
     for iteration in range(1, 2 * step.rounds + 1):  # noqa: B007 the number of the last is told
         if found.points < FEWEST_POINTS:
             break
@@ -62,12 +67,12 @@ def with_joint_offsets(
         b = found.b - prior * np.r_[np.zeros(6), offsets]
         move = limited(np.linalg.solve(A + 1e-3 * np.diag(np.diag(found.A)) + 1e-9 * np.eye(len(A)), b))
         pose, offsets = se3.exp(move[:6]) @ pose, offsets + move[6:]
-        found = compare(lines, pose, kinematics, offsets, step, radius_m)
+        found = compare(lines, pose, robot, offsets, step, radius_m)
         converged = settled(found, move)
         if converged:
             break
     sigmas = np.sqrt(CORRELATED_POINTS * np.diag(np.linalg.inv(found.A + np.diag(prior)))[6:])
-    extras = told(kinematics.joint_names, offsets, sigmas, np.full(len(offsets), PRIOR_RAD))
+    extras = told(robot.joint_names, offsets, sigmas, np.full(len(offsets), PRIOR_RAD))
     return Offsets(Refined(pose, found, iteration, converged), extras)
 
 

@@ -17,9 +17,10 @@ from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.rendering import Renderer, RenderMesh
+from hecbench.rendering.undistort import shrunk_intrinsics
 from hecbench_plugins import threads
 from hecbench_plugins.maskless import kernels
-from hecbench_plugins.maskless.canvas import Canvas, shrunk_intrinsics
+from hecbench_plugins.views.canvas import Canvas
 
 Array = NDArray[np.float64]
 

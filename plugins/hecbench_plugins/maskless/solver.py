@@ -13,15 +13,25 @@ from hecbench.errors import InputError, Refusal, SolverFailure
 from hecbench.estimate import Estimate
 from hecbench.recording import Mounting, Recording
 from hecbench.rendering import RenderMesh
-from hecbench_plugins import scene_background
-from hecbench_plugins.guess_free import ViewSphere
+from hecbench.robots.posed import PosedRobot
 from hecbench_plugins.maskless import evidence
-from hecbench_plugins.maskless.align import FEWEST_POINTS, Background, Lines, Refined, Step, refine, schedule
-from hecbench_plugins.maskless.canvas import Canvas, unfold
-from hecbench_plugins.maskless.free import starts
+from hecbench_plugins.maskless.align import (
+    FEWEST_POINTS,
+    Background,
+    ContourMatcher,
+    Refined,
+    RefinementLevel,
+    refine,
+    schedule,
+)
 from hecbench_plugins.maskless.offsets import compare, prior_information, with_joint_offsets
 from hecbench_plugins.maskless.search import SEARCH_LEVEL, Ball, Score, search
-from hecbench_plugins.render_views import Kinematics, moving_robot
+from hecbench_plugins.second_order.unknowns import Unknown
+from hecbench_plugins.start_search.by_photographs import starts
+from hecbench_plugins.start_search.view_sphere import ViewSphere
+from hecbench_plugins.views import scene_background
+from hecbench_plugins.views.canvas import Canvas, undistorted_canvas
+from hecbench_plugins.views.pyramid import meshes_by_level, photographed_robot
 
 Array = NDArray[np.float64]
 
@@ -40,7 +50,7 @@ _TOOL_SHARE = 0.6
 
 
 @dataclass(frozen=True, eq=False)
-class Place:
+class SearchRegion:
     """Where to search: about which parent_T_camera (4, 4), how far, and with how many descents."""
 
     start: Array
@@ -56,8 +66,8 @@ class Candidate:
     """Where a descent ended, and the share of its contour that the images confirm."""
 
     camera_T_parent: Array
-    sharp: float
-    place: Place
+    confirmed_share: float
+    place: SearchRegion
     path: tuple[tuple[str, Array], ...]
     """Stage and camera_T_parent on the way there."""
 
@@ -66,14 +76,14 @@ class Candidate:
 class Photographs:
     """All photographs of a recording, the few that are searched, and what is known of their background."""
 
-    kinematics: Kinematics
+    robot: PosedRobot
     meshes: dict[int, RenderMesh]
     canvas: Canvas
-    few: Canvas
+    search_views: Canvas
     background: Background | None
     renders: int = 0
     descents: int = 0
-    _searched: dict[Step, Lines] = field(default_factory=dict)
+    _searched: dict[RefinementLevel, ContourMatcher] = field(default_factory=dict)
 
     @staticmethod
     def of(recording: Recording) -> Photographs:
@@ -83,31 +93,35 @@ class Photographs:
             Refusal: no intrinsics, robot, joints or images; joints outside the limits.
         """
         try:
-            kinematics, meshes = moving_robot(recording)
-            canvas = unfold(recording, kinematics)
+            robot = photographed_robot(recording)
+            canvas = undistorted_canvas(recording, robot)
         except InputError as error:
             raise Refusal(str(error)) from error
-        few = canvas.subset(np.unique(np.linspace(0, len(canvas) - 1, _SEARCH_VIEWS).round().astype(int)))
+        search_views = canvas.subset(
+            np.unique(np.linspace(0, len(canvas) - 1, _SEARCH_VIEWS).round().astype(int))
+        )
         fixed = recording.mounting is Mounting.EYE_TO_HAND and len(canvas) >= scene_background.FEWEST_VIEWS
         background = Background.of(canvas.images) if fixed else None
-        return Photographs(kinematics, meshes, canvas, few, background)
+        return Photographs(robot, meshes_by_level(robot.model), canvas, search_views, background)
 
     def foreground(self) -> NDArray[np.float32] | None:
-        """How unlike the background each pixel of the few is (n, H, W), None where that is not known."""
+        """How unlike the background each pixel of the searched views is (n, H, W), None where that is not known."""
         if self.background is None:
             return None
-        return scene_background.foreground(self.few.images, self.background.image.astype(np.float32))
+        return scene_background.foreground(self.search_views.images, self.background.image.astype(np.float32))
 
-    def lines(self, step: Step, canvas: Canvas) -> Lines:
+    def lines(self, step: RefinementLevel, canvas: Canvas) -> ContourMatcher:
         """The views of a canvas at the size of a step."""
         background = self.background if step.background else None
-        return Lines(self.meshes[min(step.level, max(self.meshes))], canvas, step.level, background)
+        return ContourMatcher(self.meshes[min(step.level, max(self.meshes))], canvas, step.level, background)
 
     def refined(self, camera_T_parent: Array) -> Refined:
-        """All steps but the last from a pose of the search, on the few."""
+        """All steps but the last from a pose of the search, on the searched views."""
         pose, found = camera_T_parent, None
         for step in schedule(self.canvas.valid.shape[1])[0]:
-            lines = self._searched.get(step) or self._searched.setdefault(step, self.lines(step, self.few))
+            lines = self._searched.get(step) or self._searched.setdefault(
+                step, self.lines(step, self.search_views)
+            )
             before = lines.renders
             found = refine(lines, pose, step)
             pose = found.camera_T_parent
@@ -121,17 +135,17 @@ class Maskless:
     """The options of the method.
 
     Attributes:
-        joints: solve for constant joint offsets too.
+        unknown: solve for constant joint offsets too; nothing else can be.
         restarts: descents of the search in a ball, from one set of draws, before it is given up.
         attempts: sets of draws, each with colours clustered anew.
-        least_sharp: share of contour points that the images must confirm for an end to be believed.
+        least_confirmed_share: share of contour points that the images must confirm for an end to be believed.
         free: the cameras that are tried when no start is to be used.
     """
 
-    joints: bool = False
+    unknown: tuple[Unknown, ...] = ()
     restarts: int = 6
     attempts: int = 2
-    least_sharp: float = 0.3
+    least_confirmed_share: float = 0.3
     free: ViewSphere | None = None
 
     def __call__(self, recording: Recording, *, rng: np.random.Generator) -> Estimate:
@@ -139,6 +153,8 @@ class Maskless:
         start = recording.initial_parent_T_camera
         if start is None and self.free is None:
             raise Refusal("a start is needed: initial_parent_T_camera, or --init FILE")
+        if set(self.unknown) - {Unknown.JOINTS}:
+            raise Refusal("without masks only joint offsets can be solved for besides the camera: give masks")
         photographs = Photographs.of(recording)
         if self.free is not None and photographs.background is None:
             raise Refusal(
@@ -146,55 +162,55 @@ class Maskless:
                 " more only: give initial_parent_T_camera, --init FILE, or masks"
             )
         found = self._find(photographs, start, rng)
-        if found.sharp < self.least_sharp:
+        if found.confirmed_share < self.least_confirmed_share:
             raise SolverFailure(
-                f"the photographs confirm {100 * found.sharp:.0f} % of the contour where the best of"
-                f" {photographs.descents} descents ended, {100 * self.least_sharp:.0f} % are needed: the camera is"
-                f" farther off than {found.place}, the joints or the robot are not those of the photographs, the"
-                " camera or the scene moved, or too little of the robot is seen; give more views or masks"
+                f"the photographs confirm {100 * found.confirmed_share:.0f} % of the contour where the best of"
+                f" {photographs.descents} descents ended, {100 * self.least_confirmed_share:.0f} % are needed: the"
+                f" camera is farther off than {found.place}, the joints or the robot are not those of the photographs,"
+                " the camera or the scene moved, or too little of the robot is seen; give more views or masks"
             )
         return self._finish(photographs, found)
 
     def _find(self, photographs: Photographs, start: Array | None, rng: np.random.Generator) -> Candidate:
         """The first end that the images confirm, or the best of all descents."""
-        few, foreground = photographs.few, photographs.foreground()
+        search_views, foreground = photographs.search_views, photographs.foreground()
         best: Candidate | None = None
         for place in self._places(photographs, start, foreground):
-            score = Score(photographs.meshes[SEARCH_LEVEL], few, foreground, rng)
+            score = Score(photographs.meshes[SEARCH_LEVEL], search_views, foreground, rng)
             for coarse, _ in search(score, place.start, place.ball, place.restarts, rng):
                 photographs.descents += 1
                 end = photographs.refined(se3.inverse(coarse))
                 away = place.ball.away(place.start, se3.inverse(end.camera_T_parent))
-                sharp = end.last.sharp if max(away) < _OUTSIDE else 0.0
-                if best is None or sharp > best.sharp:
+                sharp = end.last.confirmed_share if max(away) < _OUTSIDE else 0.0
+                if best is None or sharp > best.confirmed_share:
                     path = (("start", se3.inverse(place.start)), ("search", se3.inverse(coarse)))
                     best = Candidate(end.camera_T_parent, sharp, place, path)
-                if sharp >= self.least_sharp:
+                if sharp >= self.least_confirmed_share:
                     break
-            photographs.renders += score.evaluations * len(few)
-            if best is not None and best.sharp >= self.least_sharp:
+            photographs.renders += score.evaluations * len(search_views)
+            if best is not None and best.confirmed_share >= self.least_confirmed_share:
                 break
         assert best is not None
         return best
 
     def _places(
         self, photographs: Photographs, start: Array | None, foreground: NDArray[np.float32] | None
-    ) -> list[Place]:
+    ) -> list[SearchRegion]:
         """Where to search, in this order."""
         if self.free is not None and foreground is not None:
             mesh = photographs.meshes[SEARCH_LEVEL]
-            found = starts(mesh, photographs.few, foreground, self.free, _FREE_STARTS)
-            return [Place(se3.inverse(pose), _FREE_BALL, 1) for pose in found]
+            found = starts(mesh, photographs.search_views, foreground, self.free, _FREE_STARTS)
+            return [SearchRegion(se3.inverse(pose), _FREE_BALL, 1) for pose in found]
         assert start is not None
         balls = (FAR,) if len(photographs.canvas) >= _FEWEST_FOR_FAR else (NEAR, FAR)
-        return [Place(start, ball, self.restarts) for ball in balls for _ in range(self.attempts)]
+        return [SearchRegion(start, ball, self.restarts) for ball in balls for _ in range(self.attempts)]
 
     def _finish(self, photographs: Photographs, found: Candidate) -> Estimate:
         """The last steps on all photographs, and the evidence."""
         canvas = photographs.canvas
         earlier, last = schedule(canvas.valid.shape[1])
         pose, path = found.camera_T_parent, [*found.path, ("refined", found.camera_T_parent)]
-        if len(photographs.few) < len(canvas):
+        if len(photographs.search_views) < len(canvas):
             lines = photographs.lines(earlier[-1], canvas)
             pose = refine(lines, pose, earlier[-1]).camera_T_parent
             photographs.renders += lines.renders
@@ -204,12 +220,12 @@ class Maskless:
         if left_out_m:
             end = refine(lines, end.camera_T_parent, last, left_out_m)
         extras: dict[str, Any] = {}
-        kinematics, nominal = photographs.kinematics, np.zeros(canvas.joints_rad.shape[1])
-        if self.joints:
-            solved = with_joint_offsets(lines, end.camera_T_parent, kinematics, last, left_out_m)
+        robot, nominal = photographs.robot, np.zeros(canvas.joints_rad.shape[1])
+        if self.unknown:
+            solved = with_joint_offsets(lines, end.camera_T_parent, robot, last, left_out_m)
             end, extras, judged = solved.refined, solved.extras, solved.refined.last
         else:
-            judged = compare(lines, end.camera_T_parent, kinematics, nominal, last, left_out_m)
+            judged = compare(lines, end.camera_T_parent, robot, nominal, last, left_out_m)
         return evidence.answer(
             end,
             evidence.covariance(end.camera_T_parent, judged, prior_information(len(nominal))),
@@ -217,7 +233,7 @@ class Maskless:
             path,
             photographs.renders + lines.renders,
             {
-                "confirmed": found.sharp,
+                "confirmed": found.confirmed_share,
                 "descents": photographs.descents,
                 "background_known": photographs.background is not None,
                 "searched": str(found.place),
@@ -227,12 +243,12 @@ class Maskless:
         )
 
 
-def _carries_something(lines: Lines, end: Refined, spacing: float) -> bool:
+def _carries_something(lines: ContourMatcher, end: Refined, spacing: float) -> bool:
     """Whether the images confirm much less of the contour near the flange than elsewhere: a tool or target is there.
 
     The sphere around the flange is then left out, as something that the model does not know.
     """
     whole, rest = end.last, lines(end.camera_T_parent, spacing, radius_m=_TOOL_M)
     judged = whole.view_judged.sum() - rest.view_judged.sum()
-    confirmed = whole.view_sharp @ whole.view_judged - rest.view_sharp @ rest.view_judged
-    return bool(judged >= FEWEST_POINTS and confirmed < _TOOL_SHARE * rest.sharp * judged)
+    confirmed = whole.view_confirmed_share @ whole.view_judged - rest.view_confirmed_share @ rest.view_judged
+    return bool(judged >= FEWEST_POINTS and confirmed < _TOOL_SHARE * rest.confirmed_share * judged)

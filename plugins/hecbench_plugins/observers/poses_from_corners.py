@@ -8,7 +8,7 @@ from dataclasses import replace
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Need, ObserverSpec
-from hecbench_plugins.target_poses import target_poses
+from hecbench_plugins.markers.target_poses import target_poses
 
 
 def poses_from_corners(recording: Recording) -> Recording:

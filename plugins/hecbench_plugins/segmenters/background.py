@@ -1,8 +1,8 @@
 """Robot masks by what differs from the background that several views of a fixed camera share.
 
-Per-pixel mode over the views (`hecbench_plugins.scene_background`), then cleaning. Where the robot stands in most of
-the views the shared picture shows the robot, and the images alone cannot tell it from background: there the robot drawn
-at the recording's start, when it has one, decides.
+Per-pixel mode over the views (`views.scene_background`), then cleaning. Where the robot stands in most of the views,
+the shared picture shows the robot, and the images alone cannot tell it from background: there the robot drawn at the
+recording's start, when it has one, decides.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from hecbench.errors import Refusal
 from hecbench.recording import Mounting, Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Need, SegmenterSpec
-from hecbench_plugins.scene_background import FEWEST_VIEWS, background, foreground
-from hecbench_plugins.silhouettes import Silhouettes, Uncertainty
+from hecbench_plugins.views.scene_background import FEWEST_VIEWS, background, foreground
+from hecbench_plugins.views.silhouettes import Silhouettes, Uncertainty
 
 Mask = NDArray[np.bool_]
 Floats = NDArray[np.float32]

@@ -16,7 +16,7 @@ from hecbench.errors import Refusal
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Need, SegmenterSpec
-from hecbench_plugins.silhouettes import Silhouettes, Uncertainty
+from hecbench_plugins.views.silhouettes import Silhouettes, Uncertainty
 
 _SHRINK = 2
 """Pixels of the image per pixel of the segmentation."""

@@ -9,14 +9,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hecbench.bundle_adjustment import adjust_with_noise
-from hecbench.bundle_model import Noise, start
+from hecbench.bundle.adjustment import adjust_with_noise
+from hecbench.bundle.model import Noise, start
 from hecbench.errors import Refusal
 from hecbench.estimate import Estimate
 from hecbench.recording import CameraModel, Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Need, SolverSpec
-from hecbench_plugins.reprojection import DEFAULT_NOISE, adjust_with_exact_robot, answer, corner_problem
+from hecbench_plugins.markers.reprojection import (
+    DEFAULT_NOISE,
+    adjust_with_exact_robot,
+    answer,
+    corner_problem,
+)
 
 
 @dataclass(frozen=True)
@@ -75,7 +80,7 @@ class Bundle:
             raise Refusal("needs camera.K")
         if self.intrinsics:
             problem = corner_problem(recording, self.intrinsics.sigmas(camera))
-        first = start(problem, exact.state.parent_T_camera, exact.state.other_T_target)
+        first = start(problem, exact.state.parent_T_camera, exact.state.carrier_T_target)
         solution = adjust_with_noise(problem, first, self._noise(), self._known())
         if not self.intrinsics:
             return answer(problem, solution)

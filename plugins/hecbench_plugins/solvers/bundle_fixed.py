@@ -12,7 +12,7 @@ from hecbench.estimate import Estimate
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Need, SolverSpec
-from hecbench_plugins.reprojection import adjust_with_exact_robot, answer, corner_problem
+from hecbench_plugins.markers.reprojection import adjust_with_exact_robot, answer, corner_problem
 
 
 def bundle_fixed(recording: Recording, *, rng: np.random.Generator) -> Estimate:

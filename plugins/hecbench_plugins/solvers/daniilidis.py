@@ -10,8 +10,8 @@ from hecbench.estimate import Estimate
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Need, SolverSpec
-from hecbench_plugins.hand_eye import answer, pose_pairs
-from hecbench_plugins.opencv_hand_eye import hand_eye, without_half_turns
+from hecbench_plugins.markers.hand_eye import answer, pose_pairs
+from hecbench_plugins.markers.opencv_hand_eye import hand_eye, without_half_turns
 
 
 def daniilidis(recording: Recording, *, rng: np.random.Generator) -> Estimate:

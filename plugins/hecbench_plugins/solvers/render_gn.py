@@ -1,4 +1,4 @@
-"""Second-order alignment of a rendered robot with pictures of it; the method is `hecbench_plugins.render_gn`."""
+"""Second-order alignment of a rendered robot with pictures of it, with masks or without them."""
 
 from __future__ import annotations
 
@@ -8,11 +8,15 @@ from hecbench.registry import hookimpl
 from hecbench.specs import Need, Option, Solver, SolverSpec
 
 
-def _render_gn(unknown: tuple[str, ...] = ()) -> Solver:
-    from hecbench_plugins.render_gn import RenderGN
-    from hecbench_plugins.render_unknowns import Unknown
+def render_gn(unknown: tuple[str, ...] = ()) -> Solver:
+    """The solver that also solves for what `unknown` names."""
+    from hecbench_plugins.fallback import MasksElsePhotographs
+    from hecbench_plugins.maskless.solver import Maskless
+    from hecbench_plugins.second_order.render_gn import RenderGN
+    from hecbench_plugins.second_order.unknowns import Unknown
 
-    return RenderGN(unknown=tuple(Unknown(name) for name in unknown))
+    wanted = tuple(Unknown(name) for name in unknown)
+    return MasksElsePhotographs(RenderGN(unknown=wanted), Maskless(unknown=wanted))
 
 
 def _unknowns(text: str) -> tuple[str, ...]:
@@ -29,7 +33,7 @@ def hecbench_solvers() -> Iterable[SolverSpec]:
     yield SolverSpec(
         name="render_gn",
         summary="renders the robot and aligns it by Gauss-Newton: silhouette, then colours or edges",
-        factory=_render_gn,
+        factory=render_gn,
         needs=frozenset({Need.ROBOT_MODEL, Need.JOINTS, Need.INTRINSICS, Need.INITIAL}),
         reference="own; object-space edges after Loper and Black 2014 (OpenDR) and Laine et al. 2020",
         slow=True,

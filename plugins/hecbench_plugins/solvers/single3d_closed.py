@@ -14,7 +14,7 @@ from hecbench.estimate import Estimate, Termination
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Need, SolverSpec
-from hecbench_plugins import single3d
+from hecbench_plugins.markers import single3d
 
 MINIMUM_SAMPLES = 5
 

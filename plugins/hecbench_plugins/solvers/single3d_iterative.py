@@ -12,7 +12,7 @@ from hecbench.estimate import Estimate, Termination
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Need, SolverSpec
-from hecbench_plugins import single3d
+from hecbench_plugins.markers import single3d
 
 
 def single3d_iterative(recording: Recording, *, rng: np.random.Generator) -> Estimate:

@@ -13,15 +13,15 @@ from hecbench.estimate import Estimate
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Need, SolverSpec
-from hecbench_plugins.hand_eye import (
+from hecbench_plugins.markers.hand_eye import (
     MINIMUM_ROTATION_DEG,
-    PosePairs,
+    PosedSamples,
     answer,
     pose_pairs,
     rotation_diversity_deg,
     rotation_from_logs,
 )
-from hecbench_plugins.opencv_hand_eye import hand_eye
+from hecbench_plugins.markers.opencv_hand_eye import hand_eye
 
 _USABLE_SINE = 0.3, 1.7
 """OpenCV leaves out pairs whose 2 sin(angle / 2) lies outside; without pairs it returns the identity."""
@@ -38,12 +38,12 @@ def tsai(recording: Recording, *, rng: np.random.Generator) -> Estimate:
     pairs = pose_pairs(recording)
     usable = _require_usable_pairs(pairs)
     turn = _nearest_cube_rotation(rotation_from_logs(pairs))
-    turned = PosePairs(pairs.hand, turn @ pairs.camera_T_target)
+    turned = PosedSamples(pairs.hand, turn @ pairs.camera_T_target)
     parent_T_camera = hand_eye(turned, cv2.CALIB_HAND_EYE_TSAI) @ turn
     return answer(pairs, parent_T_camera, diagnostics={"pairs_used": usable, "pairs": len(pairs.motions[0])})
 
 
-def _require_usable_pairs(pairs: PosePairs) -> int:
+def _require_usable_pairs(pairs: PosedSamples) -> int:
     """How many pairs OpenCV will use.
 
     Raises:

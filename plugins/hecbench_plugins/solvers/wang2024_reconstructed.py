@@ -19,10 +19,10 @@ from hecbench.estimate import Estimate
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Need, SolverSpec
-from hecbench_plugins import dual_quaternions
-from hecbench_plugins.hand_eye import (
+from hecbench_plugins.markers import dual_quaternions
+from hecbench_plugins.markers.hand_eye import (
     MINIMUM_ROTATION_DEG,
-    PosePairs,
+    PosedSamples,
     answer,
     pose_pairs,
     rotation_diversity_deg,
@@ -75,7 +75,7 @@ class Wang2024:
         return answer(pairs, dual_quaternions.to_transform(real, dual), diagnostics=diagnostics)
 
 
-def _without_half_turns(pairs: PosePairs) -> tuple[Array, Array]:
+def _without_half_turns(pairs: PosedSamples) -> tuple[Array, Array]:
     """The motions whose quaternions have a sign that noise cannot turn: it vanishes at 180 deg.
 
     Raises:

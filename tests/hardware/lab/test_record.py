@@ -6,9 +6,10 @@ from click.testing import CliRunner
 from hecbench_hardware.commands import record
 from hecbench_hardware.lab import cells
 
-from hecbench import recording_io, se3
+from hecbench import se3
 from hecbench.recording import Mounting, Recording, RobotDescription
-from hecbench.robot import load_robot
+from hecbench.robots.model import load_robot
+from hecbench.storage import recording_io
 
 
 @pytest.fixture

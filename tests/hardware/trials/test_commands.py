@@ -11,13 +11,14 @@ from click.testing import CliRunner
 from hecbench_hardware.lab import cells
 from hecbench_hardware.trial_commands import trial
 
-from hecbench import se3, trial_record
-from hecbench.cli import cli
+from hecbench import se3
+from hecbench.commands.cli import cli
 from hecbench.errors import InputError
 from hecbench.estimate import Estimate, Status
 from hecbench.recording import CameraModel, Mounting
 from hecbench.report import html
 from hecbench.report import trials as report
+from hecbench.storage import trial_record
 
 pytest.importorskip("mujoco", reason="the contact sweep needs mujoco: pip install 'hecbench[lab]'")
 

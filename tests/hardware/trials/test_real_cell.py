@@ -11,7 +11,7 @@ from hecbench_hardware.trials.runner import Plan
 from hecbench_hardware.trials.tasks import Task
 
 from hecbench import se3
-from hecbench.trial_record import Outcome
+from hecbench.storage.trial_record import Outcome
 
 
 class Blind:

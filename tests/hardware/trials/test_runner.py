@@ -16,9 +16,10 @@ from hecbench_hardware.trials.cell import Calibration, NotSeen
 from hecbench_hardware.trials.runner import Plan
 from hecbench_hardware.trials.tasks import Task
 
-from hecbench import registry, se3, trial_record
+from hecbench import registry, se3
 from hecbench.errors import InputError
-from hecbench.trial_record import Outcome
+from hecbench.storage import trial_record
+from hecbench.storage.trial_record import Outcome
 
 
 @pytest.mark.parametrize("task", Task)

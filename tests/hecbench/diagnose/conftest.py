@@ -5,9 +5,9 @@ import pytest
 from hecbench_datasets.synthetic_faults import FAULTS, arm_recording
 from hecbench_datasets.synthetic_markers import make
 
-from hecbench import runner
+from hecbench import preparation
 from hecbench.diagnose import check
-from hecbench.robot import load_robot
+from hecbench.robots.model import load_robot
 
 
 @pytest.fixture(scope="session")
@@ -35,7 +35,7 @@ def faulty(good):
         fault = FAULTS[name]
         source = good(kind, index)
         if fault.needs_target_poses:
-            source = runner.prepare(source)
+            source = preparation.prepare(source)
         return fault.seed(source, np.random.default_rng([11, index]))
 
     return recording
@@ -44,4 +44,4 @@ def faulty(good):
 @pytest.fixture(scope="session")
 def found():
     """Findings of a recording by id."""
-    return lambda recording: {finding.id: finding for finding in check(recording, runner.prepare)}
+    return lambda recording: {finding.id: finding for finding in check(recording)}

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from hecbench_datasets.synthetic_faults import FAULTS
 
-from hecbench import recording_io, runner, se3
+from hecbench import preparation, se3
 from hecbench.diagnose import Finding, Severity, check
 from hecbench.recording import Mounting
+from hecbench.storage import recording_io
 
 KINDS = ("tag_2m", "board_2m_in_hand", "arm")
 BAD = (Severity.WARNING, Severity.CRITICAL)
@@ -94,7 +95,7 @@ def test_other_frames_than_the_joints(frame, word, good, found):
 def test_coplanar_positions_are_named(good, found):
     """The case in which `single3d_closed` is off by decimetres."""
     rng = np.random.default_rng(0)
-    recording = runner.prepare(good("tag_2m", 0))
+    recording = preparation.prepare(good("tag_2m", 0))
     X = recording.truth_parent_T_camera
     positions = np.column_stack([rng.uniform(-0.3, 0.3, (10, 2)), 2 + rng.normal(0, 0.003, 10)])
     camera_T_target = se3.from_rotvec(rng.uniform(-0.5, 0.5, (10, 3)), positions)
@@ -161,7 +162,7 @@ def test_without_target_or_poses(good):
 
 
 def test_findings_are_json(good):
-    for finding in check(good("tag_2m", 0), runner.prepare):
+    for finding in check(good("tag_2m", 0)):
         assert isinstance(finding, Finding)
         assert set(json.loads(json.dumps(finding.to_json()))) == {
             "id", "severity", "summary", "action", "value", "limit", "samples"
@@ -171,7 +172,7 @@ def test_findings_are_json(good):
 def test_truth_is_not_read(good):
     recording = good("tag_2m", 0)
     other = replace(recording, truth_parent_T_camera=np.eye(4))
-    assert check(recording, runner.prepare) == check(other, runner.prepare)
+    assert check(recording) == check(other)
 
 
 def test_real_arm_is_good(shared, found):

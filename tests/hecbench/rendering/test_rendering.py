@@ -8,7 +8,7 @@ from hecbench.errors import InputError
 from hecbench.recording import CameraModel
 from hecbench.rendering import Renderer, RenderMesh
 from hecbench.rendering.undistort import Undistortion
-from hecbench.robot import load_robot
+from hecbench.robots.model import load_robot
 
 WIDTH, HEIGHT = 320, 240
 K = np.array([[320.0, 0, 159.5], [0, 320.0, 119.5], [0, 0, 1]])

@@ -8,8 +8,8 @@ import pytest
 from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.rendering import Renderer, RenderMesh
-from hecbench.robot import RobotModel, load_robot
-from hecbench.robot_meshes import Part
+from hecbench.robots.meshes import Part
+from hecbench.robots.model import RobotModel, load_robot
 
 WIDTH, HEIGHT, FOCAL_PX, AMBIENT = 320, 240, 320.0, 0.3
 DENSO = Path("data/robots/denso_vs060/vs060_description/vs060.urdf")

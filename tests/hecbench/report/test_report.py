@@ -8,9 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hecbench_plugins.target_poses import project as opencv_project
+from hecbench_plugins.markers.target_poses import project as opencv_project
 
-from hecbench import conformance, evidence, recording_io, registry, runner, se3
+from hecbench import conformance, registry, se3
 from hecbench.errors import InputError
 from hecbench.estimate import Estimate, Status
 from hecbench.recording import CameraModel, Mounting
@@ -24,8 +24,10 @@ from hecbench.report.recording_figures import (
     scene_figure,
 )
 from hecbench.report.tables import groups, table
-from hecbench.runner import Options, Task
+from hecbench.running import runner, solving
+from hecbench.running.runner import Options, Task
 from hecbench.specs import Kind, SolverSpec
+from hecbench.storage import evidence, recording_io
 
 
 def run_of(solver, tre_mm, index):
@@ -69,7 +71,7 @@ def calibrated(request):
     recording = replace(recording, images=(picture,) * len(recording))
     names = ("park", "shah", "bundle_fixed")
     specs = [registry.load().get(Kind.SOLVER, name, SolverSpec) for name in names]
-    estimates = runner.solve(recording, specs)
+    estimates = solving.solve(recording, specs)
     influence = np.linspace(0, 1, len(recording))
     return evidence.collect(recording, recording.sha256, [{"id": "units"}], influence), estimates
 

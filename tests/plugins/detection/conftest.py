@@ -81,7 +81,7 @@ def circles():
 @pytest.fixture(scope="session")
 def bias(camera):
     """Mean offset (2,) and rms of found points against where a pose puts the target's points, px."""
-    from hecbench_plugins.target_poses import project
+    from hecbench_plugins.markers.target_poses import project
 
     def measure(found, camera_T_target, points_m):
         expected = np.array([project(camera, pose, points_m) for pose in camera_T_target])

@@ -5,13 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hecbench_plugins.detection import detect, overlay, write_overlays
-from hecbench_plugins.target_poses import project, target_poses
+from hecbench_plugins.markers.target_poses import project, target_poses
 
-from hecbench import recording_io, se3
+from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel, Mounting, Recording
 from hecbench.registry import load
 from hecbench.specs import DatasetSpec, Kind
+from hecbench.storage import recording_io
 from hecbench.targets import ChessboardTarget, PointsTarget
 
 X = se3.from_rotvec([0.2, -0.3, 1.5], [0.05, -0.03, 0.04])

@@ -8,9 +8,10 @@ torch = pytest.importorskip("torch")
 from hecbench_plugins.first_order.drawing import MASK, BoxSum, CpuDrawer, link_mask_meshes, whole_mask_mesh  # noqa: E402
 from hecbench_plugins.first_order.poses import Increment  # noqa: E402
 from hecbench_plugins.first_order.rendered import rendered  # noqa: E402
-from hecbench_plugins.render_views import prepare, robot_and_meshes  # noqa: E402
+from hecbench_plugins.views.pyramid import meshes_by_level, prepare  # noqa: E402
 
 from hecbench import se3  # noqa: E402
+from hecbench.robots.posed import cached_robot  # noqa: E402
 
 PHASES = 24
 
@@ -22,12 +23,16 @@ def view(scene):
 
 def drawer_of(kind, view):
     if kind == "colours":
-        mesh = robot_and_meshes("ur5e")[1][1]
+        mesh = meshes_by_level(cached_robot("ur5e"))[1]
         table = np.zeros((len(mesh.colours) + 1, 4), np.float32)
         table[:-1, :3], table[:-1, 3] = mesh.colours, 1
         meshes = (mesh,)
     else:
-        meshes = (whole_mask_mesh("ur5e"),) if kind == "zbuffered" else link_mask_meshes("ur5e")
+        meshes = (
+            (whole_mask_mesh(cached_robot("ur5e")),)
+            if kind == "zbuffered"
+            else link_mask_meshes(cached_robot("ur5e"))
+        )
         table = MASK
     renderer = view.levels[1].renderer
     return CpuDrawer(meshes, table, view, renderer.K, renderer.width, renderer.height)

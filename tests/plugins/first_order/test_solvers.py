@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 from hecbench_datasets import synthetic
 
-from hecbench import registry, runner, se3
+from hecbench import registry, se3
 from hecbench.errors import InputError, Refusal
 from hecbench.estimate import Estimate, Status, Termination
 from hecbench.report.tables import groups, table
+from hecbench.running import solving
 from hecbench.specs import Kind, SolverSpec
 
 pytest.importorskip("torch")
@@ -117,7 +118,7 @@ def test_a_robot_that_leaves_the_picture_ends_the_run(exact, solve, start_off):
 def test_what_is_missing_is_refused_by_name(name, change, reason, scene):
     blind = replace(scene, **change)
     spec = registry.load().get(Kind.SOLVER, name, SolverSpec)
-    (estimate,) = runner.solve(blind, [spec])
+    (estimate,) = solving.solve(blind, [spec])
     assert estimate.status is Status.REFUSED
     assert reason in estimate.reason
 

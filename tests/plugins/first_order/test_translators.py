@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from hecbench_plugins.first_order.simlike import cut_out
-from hecbench_plugins.render_views import prepare
+from hecbench_plugins.views.pyramid import prepare
 
 from hecbench import registry, se3
 from hecbench.specs import Kind, TranslatorSpec

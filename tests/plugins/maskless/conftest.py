@@ -2,12 +2,13 @@
 
 import numpy as np
 import pytest
-from hecbench_plugins.render_views import robot_and_meshes
+from hecbench_plugins.views.pyramid import meshes_by_level
 from scipy import ndimage
 
 from hecbench import se3
 from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
 from hecbench.rendering import Renderer
+from hecbench.robots.posed import cached_robot
 
 CAMERA = CameraModel(480, 360, np.array([[480.0, 0, 239.5], [0, 480.0, 179.5], [0, 0, 1]]))
 CENTRE_RAD = np.deg2rad([0, -90, 90, -90, -90, 0])
@@ -37,7 +38,8 @@ def wall(rng):
 def photographs(mounting, views, seed=0):
     """A recording without masks; the start is 0.05 m and 5 deg off."""
     rng = np.random.default_rng(seed)
-    model, meshes = robot_and_meshes("ur3e")
+    model = cached_robot("ur3e")
+    meshes = meshes_by_level(model)
     joints = CENTRE_RAD + rng.uniform(-0.6, 0.6, (views, 6))
     if mounting is Mounting.EYE_TO_HAND:
         parent, truth = "base_link", looking(np.array([1.1, 0.3, 0.5]), np.array([0.1, 0.0, 0.25]))

@@ -5,15 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hecbench_datasets import maskless as suites
-from hecbench_plugins.guess_free import GuessFree
-from hecbench_plugins.render_gn import RenderGN
+from hecbench_plugins.solvers.render_gn import render_gn
+from hecbench_plugins.solvers.render_gn_free import render_gn_free
 
 from hecbench import se3
 from hecbench.errors import InputError, Refusal, SolverFailure
 
 
 def solve(recording, *unknown):
-    return RenderGN(unknown=unknown)(recording.without_truth(), rng=np.random.default_rng(0))
+    return render_gn(unknown=unknown)(recording.without_truth(), rng=np.random.default_rng(0))
 
 
 def error_mm(estimate, recording):
@@ -41,7 +41,7 @@ def test_a_camera_in_the_hand_sees_its_own_arm(camera_in_hand):
 
 def test_a_fixed_camera_is_found_without_a_start(fixed_camera):
     blind = replace(fixed_camera.without_truth(), initial_parent_T_camera=None)
-    estimate = GuessFree()(blind, rng=np.random.default_rng(0))
+    estimate = render_gn_free()(blind, rng=np.random.default_rng(0))
     assert error_mm(estimate, fixed_camera) < 2
     assert estimate.diagnostics["stage"] == "maskless"
 
@@ -49,7 +49,7 @@ def test_a_fixed_camera_is_found_without_a_start(fixed_camera):
 def test_without_a_start_one_photograph_is_refused(fixed_camera):
     blind = replace(fixed_camera.subset([0]).without_truth(), initial_parent_T_camera=None)
     with pytest.raises(Refusal, match="3 photographs or more"):
-        GuessFree()(blind, rng=np.random.default_rng(0))
+        render_gn_free()(blind, rng=np.random.default_rng(0))
 
 
 def test_the_same_photographs_give_the_same_answer(fixed_camera):
@@ -131,16 +131,16 @@ def test_suites_without_their_recordings_say_where_to_put_them(tmp_path, monkeyp
 
 
 def test_large_photographs_are_shrunk(fixed_camera):
-    from hecbench_plugins.maskless.canvas import unfold
-    from hecbench_plugins.render_views import moving_robot
+    from hecbench_plugins.views.canvas import undistorted_canvas
+    from hecbench_plugins.views.pyramid import photographed_robot
 
-    kinematics, _ = moving_robot(fixed_camera)
+    robot = photographed_robot(fixed_camera)
     K = fixed_camera.camera.K.copy()
     K[:2] *= 4
     K[:2, 2] += 1.5
     camera = replace(fixed_camera.camera, width=1920, height=1440, K=K)
     large = tuple(np.repeat(np.repeat(image, 4, 0), 4, 1) for image in fixed_camera.images)
-    canvas = unfold(replace(fixed_camera, camera=camera, images=large), kinematics)
+    canvas = undistorted_canvas(replace(fixed_camera, camera=camera, images=large), robot)
     assert canvas.images.shape == (4, 720, 960, 3)
     np.testing.assert_allclose(canvas.K[:2, :2], fixed_camera.camera.K[:2, :2] * 2)
     np.testing.assert_allclose(canvas.K[:2, 2], fixed_camera.camera.K[:2, 2] * 2 + 0.5)

@@ -1,0 +1,5 @@
+"""`python -m hecbench`."""
+
+from hecbench.commands.cli import main
+
+main()

@@ -1,0 +1,1 @@
+"""From what a user names to tasks, and from tasks to estimates."""

@@ -1,0 +1,153 @@
+"""Plan = recordings x solvers -> a store of estimates, one recording after the other or in parallel."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from hecbench import diagnose, registry
+from hecbench.errors import InputError
+from hecbench.estimate import Estimate
+from hecbench.preparation import load_recording, prepare, segmented
+from hecbench.recording import Recording
+from hecbench.running.solving import Options, provenance, solve_prepared
+from hecbench.specs import Kind, SolverSpec, SuiteSpec
+from hecbench.storage import evidence, store
+from hecbench.storage.evidence import Evidence
+
+
+@dataclass(frozen=True)
+class Task:
+    """One recording, from disk or from a suite, and the solvers to run on it."""
+
+    solvers: tuple[str, ...]
+    path: Path | None = None
+    suite: str | None = None
+    level: str | None = None
+    index: int = 0
+
+    def recording(self, seed: int) -> Recording:
+        """Load or generate it."""
+        if self.path is not None:
+            return load_recording(self.path)
+        suite = registry.load().get(Kind.SUITE, str(self.suite), SuiteSpec)
+        return suite.make(str(self.level), self.index, seed)
+
+    def facts(self, seed: int) -> Mapping[str, float]:
+        """What the suite tells about the item beside its recording."""
+        if self.path is not None:
+            return {}
+        return (
+            registry.load()
+            .get(Kind.SUITE, str(self.suite), SuiteSpec)
+            .facts(str(self.level), self.index, seed)
+        )
+
+    @property
+    def item(self) -> str:
+        """The recording's path, or its number in the level."""
+        return str(self.path) if self.path is not None else f"{self.index:06d}"
+
+
+def execute(task: Task, options: Options) -> tuple[list[Estimate], Evidence | None]:
+    """Run one task, the unit of parallel work; a recording from disk is examined too, for the report."""
+    specs = [registry.load().get(Kind.SOLVER, name, SolverSpec) for name in task.solvers]
+    recording = task.recording(options.seed)
+    ready = prepare(recording)
+    prepared = segmented(ready, options.segmenter)
+    facts = task.facts(options.seed)
+    origin = provenance(recording, options) | ({"facts": dict(facts)} if facts else {})
+    estimates = [
+        replace(estimate, suite=task.suite or "files", level=task.level, item=task.item)
+        for estimate in solve_prepared(prepared, specs, options, origin)
+    ]
+    return estimates, None if task.path is None else _examined(recording, ready)
+
+
+def _examined(recording: Recording, prepared: Recording) -> Evidence:
+    findings = diagnose.check(recording, prepared)
+    influence = next((dict(f.per_sample) for f in findings if f.id == "influence"), {})
+    influence_mm = np.array([influence.get(sample, np.nan) for sample in recording.sample_ids])
+    return evidence.collect(prepared, recording.sha256, [f.to_json() for f in findings], influence_mm)
+
+
+def remaining(tasks: Iterable[Task], done: Iterable[Estimate], options: Options) -> list[Task]:
+    """The tasks without the solvers that already have a result of the same place, content, seed and masks."""
+    finished = {store.key(estimate)[:3] + store.key(estimate)[4:] for estimate in done}
+    contents = {store.key(estimate)[3] for estimate in done}
+
+    def missing(task: Task) -> tuple[str, ...]:
+        place = task.suite or "files", task.level, task.item
+        if task.path is not None and contents and load_recording(task.path).sha256 not in contents:
+            return task.solvers
+        return tuple(s for s in task.solvers if (*place, s, options.seed, options.segmenter) not in finished)
+
+    pruned = (replace(task, solvers=missing(task)) for task in tasks)
+    return [task for task in pruned if task.solvers]
+
+
+def run(
+    tasks: Sequence[Task],
+    options: Options,
+    *,
+    out: Path,
+    jobs: int = 1,
+    executor: str | None = None,
+    resume: bool = False,
+    on_result: Callable[[list[Estimate]], None] = lambda estimates: None,
+) -> store.Contents:
+    """Run the tasks into a store; what is finished is on disk at once, so an interrupted run goes on with
+    `resume`.
+
+    Raises:
+        InputError: a recording cannot be read, or the store is in use or not empty.
+        HecbenchError: the store cannot be written.
+    """
+    with store.writing(out, resume=resume) as writer:
+        done = store.read(out).estimates
+        for estimates, found in _executed(remaining(tasks, done, options), options, jobs, executor):
+            if found is not None:
+                evidence.save(found, out)
+            writer.append(estimates)
+            on_result(estimates)
+    return store.read(out)
+
+
+def _executed(
+    tasks: Sequence[Task], options: Options, jobs: int, executor: str | None
+) -> Iterator[tuple[list[Estimate], Evidence | None]]:
+    """The results as they come: here, in worker processes, or on a cluster."""
+    if executor is None and (jobs == 1 or len(tasks) < 2):
+        yield from (execute(task, options) for task in tasks)
+        return
+    from joblib import Parallel, delayed
+
+    with _backend(executor):
+        parallel = Parallel(n_jobs=jobs if executor is None else -1, return_as="generator_unordered")
+        yield from parallel(delayed(execute)(task, options) for task in tasks)
+
+
+@contextmanager
+def _backend(executor: str | None) -> Iterator[None]:
+    """joblib's own processes, or the workers of the dask scheduler at a URL."""
+    if executor is None:
+        yield
+        return
+    from joblib import parallel_config
+
+    try:
+        from distributed import Client
+
+        client = Client(executor, timeout="5s", set_as_default=False)
+    except ImportError:
+        raise InputError("--executor needs dask: pip install 'hecbench[cluster]'") from None
+    except (OSError, ValueError, TypeError) as error:
+        raise InputError(
+            f"--executor {executor}: no scheduler answers ({error}); give its tcp://host:port"
+        ) from error
+    with client, parallel_config(backend="dask", client=client):
+        yield

@@ -1,0 +1,1 @@
+"""What lies on disk: recordings, stores of results, evidence for the report, records of trials."""

@@ -1,0 +1,1 @@
+"""What the marker-based solvers share."""

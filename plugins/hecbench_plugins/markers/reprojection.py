@@ -1,0 +1,169 @@
+"""What the reprojection solvers share: OpenCV's camera with its derivatives, the problem, and the start."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hecbench import se3
+from hecbench.bundle.adjustment import Solution, adjust
+from hecbench.bundle.model import Noise, Problem, State, linearise, start
+from hecbench.errors import Refusal, SolverFailure
+from hecbench.estimate import Estimate
+from hecbench.recording import Recording
+from hecbench_plugins.markers import single3d
+from hecbench_plugins.markers.hand_eye import pose_pairs
+from hecbench_plugins.markers.opencv_hand_eye import robot_world
+from hecbench_plugins.markers.target_poses import planar_candidates
+
+Array = NDArray[np.float64]
+
+DEFAULT_NOISE = Noise(0.3, float(np.deg2rad(0.05)), 5e-4)
+"""A corner, and a good arm: px, rad, m."""
+_STARTS = 2
+_EXPLAINS = 0.2
+"""Of the target's motion in the image that may remain; good data leave a few per cent."""
+_AGREEING_RAD = np.deg2rad(8.0)
+
+
+def opencv_camera(points_c: Array, parameters: Array) -> tuple[Array, Array, Array]:
+    """Pixels (M, 2) of points (M, 3) m for parameters [fx, fy, cx, cy, distortion...], and the derivatives.
+
+    The derivative by a translation of the camera frame is the derivative by the point.
+    """
+    import cv2
+
+    fx, fy, cx, cy = parameters[:4]
+    K = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]])
+    pixels, derivatives = cv2.projectPoints(points_c, np.zeros(3), np.zeros(3), K, parameters[4:])
+    by_all = derivatives.reshape(len(points_c), 2, -1)
+    return pixels[:, 0], by_all[:, :, 3:6], by_all[:, :, 6 : 6 + len(parameters)]
+
+
+def corner_problem(recording: Recording, prior_sigmas: Array | None = None) -> Problem:
+    """The samples with a robot pose and target points; with `prior_sigmas` (4 + D,) the intrinsics are free.
+
+    Raises:
+        Refusal: no corners, intrinsics or robot poses, or the samples do not determine X.
+    """
+    pose_pairs(recording)
+    camera, target, corners_px = recording.camera, recording.target, recording.corners_px
+    if camera is None or camera.K is None or target is None or corners_px is None:
+        raise Refusal("needs corners_px, target and camera.K")
+    assert recording.base_T_flange is not None
+    usable = np.isfinite(recording.base_T_flange).all((1, 2)) & np.isfinite(corners_px).any((1, 2))
+    known = np.array([camera.K[0, 0], camera.K[1, 1], camera.K[0, 2], camera.K[1, 2], *camera.distortion])
+
+    def calibrated_camera(points_c: Array, parameters: Array) -> tuple[Array, Array, Array]:
+        pixels, by_point, by_parameter = opencv_camera(points_c, known)
+        return pixels, by_point, by_parameter[..., :0]
+
+    problem = Problem(
+        recording.mounting,
+        recording.base_T_flange[usable],
+        target.points_m,
+        corners_px[usable],
+        calibrated_camera,
+    )
+    if prior_sigmas is None:
+        return problem
+    return replace(problem, sensor=opencv_camera, parameters=known, parameter_sigmas=prior_sigmas)
+
+
+def adjust_with_exact_robot(recording: Recording, problem: Problem) -> Solution:
+    """The least reprojection error over X and Y (Tabb and Ahmad Yousef 2017, rp1), from several starts.
+
+    Raises:
+        Refusal: no method gives a start.
+        SolverFailure: what is left is not small against the target's own motion in the image.
+    """
+    noise = Noise(DEFAULT_NOISE.observed)
+    starts = sorted(_starts(recording, problem), key=lambda state: linearise(problem, state, noise).cost)
+    if not starts:
+        raise Refusal("neither single3d nor shah gives a start on this recording")
+    found = [adjust(problem, state, noise) for state in starts[:_STARTS]]
+    best = min(found, key=lambda solution: solution.at.cost)
+    left_px = float(np.median(np.linalg.norm(best.at.residuals[problem.seen], axis=1)))
+    centres_px = np.nanmean(problem.observed, axis=1)
+    moved_px = float(np.median(np.linalg.norm(centres_px - np.median(centres_px, axis=0), axis=1)))
+    if left_px > _EXPLAINS * moved_px:
+        raise SolverFailure(
+            f"leaves {left_px:.3g} px in the median where the target moved by {moved_px:.3g}: "
+            "are the robot poses inverted, or the mounting wrong?"
+        )
+    return best
+
+
+def _starts(recording: Recording, problem: Problem) -> list[State]:
+    """X by Single3D and by Shah, each with the Y that most samples agree on and the next different one."""
+    candidates, _ = planar_candidates(recording)
+    hand = recording.hand_poses()
+    usable = np.isfinite(hand).all((1, 2)) & np.isfinite(candidates).all((1, 2, 3))
+    states = []
+    for first_guess in (_by_single3d, _by_shah):
+        try:
+            parent_T_camera = first_guess(recording)
+        except (Refusal, SolverFailure):
+            continue
+        seen_as = se3.inverse(hand[usable, None]) @ parent_T_camera @ candidates[usable]
+        states += [
+            start(problem, parent_T_camera, other) for other in _most_agreed(seen_as.reshape(-1, 4, 4))
+        ]
+    return [state for state in states if np.isfinite(linearise(problem, state, DEFAULT_NOISE).cost)]
+
+
+def _by_single3d(recording: Recording) -> Array:
+    positions = single3d.marker_positions(recording)
+    return positions.rest_given(single3d.iterate(positions)[0])[0]
+
+
+def _by_shah(recording: Recording) -> Array:
+    import cv2
+
+    return robot_world(pose_pairs(recording), cv2.CALIB_ROBOT_WORLD_HAND_EYE_SHAH)[0]
+
+
+def _most_agreed(poses: Array) -> list[Array]:
+    """Of poses (M, 4, 4), the one whose rotation most others share, and the best one unlike it."""
+    angles = se3.rotation_error_rad(poses[:, None], poses)
+    loneliness = np.minimum(angles, _AGREEING_RAD).sum(1)
+    first = int(loneliness.argmin())
+    unlike = np.flatnonzero(angles[first] > _AGREEING_RAD)
+    chosen = [first, *unlike[loneliness[unlike].argsort()[:1]]]
+    offset = np.median(poses[:, :3, 3], axis=0)
+    return [se3.make(poses[i, :3, :3], offset) for i in chosen]
+
+
+def rms_px(problem: Problem, solution: Solution) -> float:
+    """Rms distance between predicted and observed points, px."""
+    return float(np.sqrt((solution.at.residuals**2).sum() / problem.seen.sum()))
+
+
+def answer(problem: Problem, solution: Solution, **extras: object) -> Estimate:
+    """The estimate with its evidence."""
+    corrections = solution.at.corrections
+    diagnostics: dict[str, object] = {
+        "samples": len(problem.observed),
+        "points": int(problem.seen.sum()),
+        "reprojection_rms_px": rms_px(problem, solution),
+        "sigma_px": solution.noise.observed,
+    }
+    if not solution.noise.robot_is_exact:
+        diagnostics |= {
+            "sigma_robot_rotation_deg": float(np.rad2deg(solution.noise.rotation_rad)),
+            "sigma_robot_translation_mm": 1e3 * solution.noise.translation_m,
+            "robot_correction_rms_deg": float(np.rad2deg(np.sqrt((corrections[:, :3] ** 2).sum(1).mean()))),
+            "robot_correction_rms_mm": float(1e3 * np.sqrt((corrections[:, 3:] ** 2).sum(1).mean())),
+            "redundancy": solution.redundancy.tolist(),
+        }
+    return Estimate(
+        solution.state.parent_T_camera,
+        solution.state.carrier_T_target,
+        covariance=None if solution.noise.robot_is_exact else solution.covariance[:6, :6],
+        termination=solution.termination,
+        iterations=solution.iterations,
+        diagnostics=diagnostics,
+        extras=extras,
+    )

@@ -1,0 +1,1 @@
+"""`render_gn`: Gauss-Newton alignment of the drawn robot with masks and pictures."""

@@ -1,0 +1,176 @@
+"""Second-order alignment of a rendered robot with pictures of it: Gauss-Newton on silhouette, colours and edges.
+
+Coarse to fine on one CPU core: translation from centroid and area of the mask; the drawn contour against the
+signed distance of the mask's contour; the anti-aliased picture of flat parts, one colour per part estimated
+within the loop. Before a textured background the mask takes the place of the colours: its coverage, then the intervals
+between pixel centres through which its contour must pass.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hecbench import se3
+from hecbench.errors import Refusal, SolverFailure
+from hecbench.estimate import Estimate, Termination
+from hecbench.recording import CameraModel, Recording
+from hecbench.robots.posed import PosedRobot
+from hecbench_plugins.second_order import evidence
+from hecbench_plugins.second_order.descent import Trace, descend, draw_counted
+from hecbench_plugins.second_order.mask_intervals import between_pixels
+from hecbench_plugins.second_order.photometry import Photometry, tone_exponent
+from hecbench_plugins.second_order.silhouette import centroid_and_area, distances_at, silhouette_step
+from hecbench_plugins.second_order.unknowns import ExtendedPhotometry, Unknown, solve
+from hecbench_plugins.views.pyramid import View, linearised, prepare
+
+Array = NDArray[np.float64]
+
+_TERMINATIONS = {
+    "converged": Termination.CONVERGED,
+    "stalled": Termination.STALLED,
+    "iterations": Termination.MAX_ITERATIONS,
+}
+_MOST_ROUNDS = 40
+"""Of a descent at full size; nearly all converge in a dozen."""
+_BLURS_PX = (0.5, 0.75, 1.0, 1.25, 1.5, 2.0)
+_RESTART_TURNS_DEG = ((0, 0, 0), (0, 0, 25), (0, 0, -25), (0, 20, 0), (0, -20, 0), (20, 0, 0), (-20, 0, 0))
+
+
+@dataclass(frozen=True)
+class RenderGN:
+    """The options of the method.
+
+    An answer is believed when drawing and mask overlap by `sure_overlap`, or `good_overlap` when the colours had no
+    say or their descent no end. Where less overlaps, either something hides
+    part of the robot or the pose is wrong. What hides a part cuts pieces off the mask and leaves the rest of its
+    contour in place, a wrong pose draws its contour elsewhere: besides `least_overlap`, a share `least_contour` of
+    the drawn contour must then lie within 2 px of the mask's, and without colours all but `most_violated` of it
+    between the pixel centres where the mask changes; or the run is a failure.
+
+    Attributes:
+        unknown: solved for besides the camera, each with a prior: joint offsets, scale of the robot, focal length.
+        huber: residual in [0, 1] from which on a pixel's colour counts less.
+        good_overlap: intersection over union of mask and drawing below which other starts are tried.
+        sure_overlap, least_overlap, least_contour: see above.
+        most_violated: share of the contour beside the mask's changes above which the mask is not one of sampled
+            pixels and the coverage alone decides.
+    """
+
+    unknown: tuple[Unknown, ...] = ()
+    huber: float = 0.3
+    good_overlap: float = 0.9
+    sure_overlap: float = 0.8
+    least_overlap: float = 0.6
+    least_contour: float = 2 / 3
+    most_violated: float = 0.25
+
+    def __call__(self, recording: Recording, *, rng: np.random.Generator) -> Estimate:
+        """Calibrate from the recording's start, by given masks or those that a uniform background gives."""
+        if recording.initial_parent_T_camera is None:
+            raise Refusal("render_gn needs a start: initial_parent_T_camera, or --init FILE")
+        robot, views = prepare(recording)
+        start = se3.inverse(recording.initial_parent_T_camera)
+        trace = Trace()
+        if any(self._camera_inside(view, start, trace) for view in views):
+            raise Refusal("at the start the camera is inside the robot: check its units and direction")
+        coarse = self._align(views, start, trace)
+        end = self._refine(views, coarse, trace)
+        overlap = evidence.overlap(views, end.descent.pose, trace)
+        self._believe(views, end, overlap, trace)
+        if self.unknown:
+            end = self._extend(end, robot, trace)
+        found = evidence.answer(views, end, overlap, trace, _TERMINATIONS[end.descent.ended])
+        return (
+            replace(found, camera=_calibrated(recording.camera, found)) if "focal" in found.extras else found
+        )
+
+    def _extend(self, end: evidence.FinalStage, robot: PosedRobot, trace: Trace) -> evidence.FinalStage:
+        """Solve for the other unknowns too, from where the camera alone ended."""
+        last = end.photometry
+        last(end.descent.pose)
+        wider = ExtendedPhotometry(
+            last.views,
+            last.level,
+            last.channels,
+            last.huber,
+            trace,
+            blur_px=last.blur_px,
+            robot=robot,
+            free=tuple(Unknown(unknown) for unknown in self.unknown),
+        )
+        solved = solve(wider, end.descent.pose, last.noise())
+        return evidence.FinalStage(end.kind, solved.descent, wider, solved.extras, solved.covariance)
+
+    def _believe(self, views: list[View], end: evidence.FinalStage, overlap: float, trace: Trace) -> None:
+        """Raises SolverFailure when the mask contradicts the end; see the class."""
+        colours = end.kind == "colour" and end.descent.ended != "iterations"
+        if overlap >= (self.sure_overlap if colours else self.good_overlap):
+            return
+        found = evidence.contour_found(views, end.descent.pose, trace)
+        settled = colours or end.kind == "intervals"
+        if not settled or overlap < self.least_overlap or found < self.least_contour:
+            raise SolverFailure(
+                f"ended where drawing and mask overlap by {overlap:.2f} only and share {100 * found:.0f} % of the"
+                " contour: the start is too far off, or the masks show another robot or too little of it"
+            )
+
+    def _camera_inside(self, view: View, pose: Array, trace: Trace) -> bool:
+        renderer = draw_counted(view, 4, pose, trace).renderer
+        covered = (renderer.face >= 0).mean()
+        return renderer.dropped > 0 and covered > 0.9
+
+    def _align(self, views: list[View], start: Array, trace: Trace) -> Array:
+        """The best of silhouette alignments from turned starts; the first good one ends the search."""
+        best, best_overlap = start, -1.0
+        for turn in _RESTART_TURNS_DEG:
+            pose = start.copy()
+            pose[:3, :3] = se3.so3_exp(np.deg2rad(turn)) @ start[:3, :3]
+            pose = centroid_and_area(views, pose, trace)
+            for level, clip, rounds in ((4, 15.0, 25), (2, 6.0, 12)):
+                step = silhouette_step(views, level, distances_at(views, level), clip, trace)
+                pose = descend(step, pose, rounds, trace, f"silhouette/{level}", small=1e-4).pose
+            overlap = evidence.overlap(views, pose, trace)
+            if overlap > best_overlap:
+                best, best_overlap = pose, overlap
+            if overlap > self.good_overlap:
+                break
+        return best
+
+    def _refine(self, views: list[View], pose: Array, trace: Trace) -> evidence.FinalStage:
+        """Photometry where flat colours explain the pictures, else coverage and the intervals of the masks."""
+        if all(view.has_image and view.uniform_background for view in views):
+            for level, rounds in ((4, 8), (2, 8), (1, _MOST_ROUNDS)):
+                photometry = Photometry(views, level, slice(0, 3), self.huber, trace)
+                descent = descend(photometry, pose, rounds, trace, f"colour/{level}")
+                pose = descent.pose
+            exponent = tone_exponent(photometry)
+            if exponent != 1.0:
+                views = [linearised(view, exponent) for view in views]
+                photometry = Photometry(views, 1, slice(0, 3), self.huber, trace)
+                descent = descend(photometry, pose, _MOST_ROUNDS, trace, f"tone {exponent:.2f}/1")
+                pose = descent.pose
+            for blur in _BLURS_PX:
+                blurred = Photometry(views, 1, slice(0, 3), self.huber, trace, blur_px=blur)
+                if blurred(pose)[0] > descent.cost:
+                    break
+                descent = descend(blurred, pose, _MOST_ROUNDS, trace, f"blur {blur}/1")
+                pose, photometry = descent.pose, blurred
+            return evidence.FinalStage("colour", descent, photometry)
+        coverage = Photometry(views, 1, slice(3, 4), self.huber, trace)
+        descent = descend(coverage, pose, _MOST_ROUNDS, trace, "coverage/1")
+        pose, violated = between_pixels(views, coverage, descent.pose, trace)
+        if violated > self.most_violated:
+            return evidence.FinalStage("coverage", descent, coverage)
+        return evidence.FinalStage("intervals", replace(descent, pose=pose), coverage)
+
+
+def _calibrated(camera: CameraModel | None, found: Estimate) -> CameraModel:
+    """The recording's camera with the focal length that was found."""
+    assert camera is not None
+    assert camera.K is not None
+    K = camera.K.copy()
+    K[:2, :2] *= np.exp(found.extras["focal"]["value"])
+    return replace(camera, K=K)

@@ -1,0 +1,1 @@
+"""What renderer methods compare: pictures, pyramids, silhouettes, shared backgrounds."""

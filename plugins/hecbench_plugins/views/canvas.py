@@ -1,0 +1,124 @@
+"""What the maskless stages look at: undistorted photographs on one padded canvas, and the robot in each of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hecbench.errors import InputError, Refusal
+from hecbench.recording import CameraModel, Recording
+from hecbench.rendering.undistort import shrunk_intrinsics
+from hecbench.robots.posed import PosedRobot
+from hecbench_plugins import threads
+
+Array = NDArray[np.float64]
+Images = NDArray[np.uint8]
+
+PAD_PX = 60
+"""By which the canvas is larger than the image on each side: a lens bends the robot's base out of the image."""
+_LARGEST_PX = 1600
+"""Wider canvases are shrunk: a contour is found to a fraction of a pixel anyway."""
+_GRID = 8
+
+
+@dataclass(frozen=True, eq=False)
+class Canvas:
+    """N photographs as a pinhole camera sees them.
+
+    Attributes:
+        K: (3, 3) px, pixel centres at integers.
+        images: (N, H, W, 3) RGB.
+        valid: (H, W) where the photographs say something.
+        joints_rad: (N, J).
+        parent_T_link: (N, L, 4, 4) m.
+        flange: index of the flange's link, None when the parent is the flange itself.
+        sample_ids: N names.
+    """
+
+    K: Array
+    images: Images
+    valid: NDArray[np.bool_]
+    joints_rad: Array
+    parent_T_link: Array
+    flange: int | None
+    sample_ids: tuple[str, ...]
+
+    def __len__(self) -> int:
+        return len(self.images)
+
+    def subset(self, indices: Sequence[int] | NDArray[np.integer]) -> Canvas:
+        """The same canvas with only these photographs."""
+        chosen = np.asarray(indices, int)
+        if np.array_equal(chosen, np.arange(len(self))):
+            return self
+        return Canvas(
+            self.K,
+            self.images[chosen],
+            self.valid,
+            self.joints_rad[chosen],
+            self.parent_T_link[chosen],
+            self.flange,
+            tuple(self.sample_ids[i] for i in chosen.tolist()),
+        )
+
+
+def undistorted_canvas(recording: Recording, robot: PosedRobot) -> Canvas:
+    """Read and undistort the photographs of all samples with joints.
+
+    Raises:
+        Refusal: there is none, or an image holds values that are not finite.
+        InputError: an image cannot be read or is not of the camera's size; joints are outside their limits.
+    """
+    camera, joints = recording.camera, robot.joints_rad
+    assert camera is not None
+    sources = recording.images or ()
+    rows = [i for i in robot.samples.tolist() if i < len(sources) and sources[i] is not None]
+    if not rows:
+        raise Refusal("no sample with joints has an image")
+    maps, K, valid = _lens(camera)
+
+    def one(row: int) -> Images:
+        import cv2
+
+        return np.asarray(cv2.remap(recording.image(row), *maps, cv2.INTER_LINEAR), np.uint8)
+
+    images = np.stack(threads.each(one, rows))
+    if (shrink := int(np.ceil(images.shape[2] / _LARGEST_PX))) > 1:
+        images, valid = _shrunk(images, valid, shrink)
+        K = shrunk_intrinsics(K, 1 / shrink)
+    at_flange = robot.flange_link == robot.parent_link
+    flange = None if at_flange else robot.model.link_index(robot.flange_link)
+    samples = tuple(recording.sample_ids[row] for row in rows)
+    return Canvas(K, images, valid, joints[rows], robot.link_poses(joints[rows]), flange, samples)
+
+
+def _lens(
+    camera: CameraModel,
+) -> tuple[tuple[NDArray[np.float32], NDArray[np.float32]], Array, NDArray[np.bool_]]:
+    """Where each pixel of the canvas lies in the image, the canvas' K, and where that is inside the image."""
+    import cv2
+
+    assert camera.K is not None
+    pad = PAD_PX if camera.distortion.any() else 0
+    width, height = (-(-(size + 2 * pad) // _GRID) * _GRID for size in (camera.width, camera.height))
+    K = camera.K.copy()
+    K[:2, 2] += pad
+    if camera.K[0, 1] != 0:
+        raise InputError("camera.K: has skew, which the undistortion of photographs does not support")
+    across, down = cv2.initUndistortRectifyMap(
+        camera.K, camera.distortion, None, K, (width, height), cv2.CV_32FC1
+    )
+    valid = (across >= 0) & (down >= 0) & (across <= camera.width - 1) & (down <= camera.height - 1)
+    return (across, down), K, valid
+
+
+def _shrunk(images: Images, valid: NDArray[np.bool_], by: int) -> tuple[Images, NDArray[np.bool_]]:
+    import cv2
+
+    height, width = (size // by // _GRID * _GRID for size in valid.shape)
+    cut = np.s_[: height * by, : width * by]
+    resize = [cv2.resize(image[cut], (width, height), interpolation=cv2.INTER_AREA) for image in images]
+    return np.stack(resize), np.asarray(valid[cut].reshape(height, by, width, by).all((1, 3)))

@@ -1,0 +1,122 @@
+"""The robot's silhouette in the pixels of a recording's own images, lens and all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hecbench import se3
+from hecbench.errors import InputError, Refusal
+from hecbench.recording import CameraModel, Recording
+from hecbench.rendering import Renderer
+from hecbench.rendering.undistort import distort, shrunk_intrinsics
+from hecbench_plugins.views.pyramid import meshes_by_level, photographed_robot
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+_UNDISTORT_ROUNDS = 20
+_UNDISTORT_PX = 0.05
+_WIDEST = 3.0
+"""Largest side of the drawn canvas over that of the image."""
+
+
+class Silhouettes:
+    """Draws the robot of a recording as masks.
+
+    Args:
+        recording: with a robot model, joints and intrinsics.
+        shrink: pixels of the recording per pixel of the masks.
+
+    Raises:
+        Refusal: one of these is not there.
+    """
+
+    def __init__(self, recording: Recording, shrink: int = 1) -> None:
+        try:
+            robot = photographed_robot(recording)
+            self.samples = robot.samples
+            """Rows that have joints; the others cannot be drawn."""
+            poses = robot.link_poses(robot.joints_rad[self.samples])
+        except InputError as error:
+            raise Refusal(f"{recording.name}: {error}") from error
+        camera, meshes = recording.camera, meshes_by_level(robot.model)
+        assert camera is not None
+        self._parent_T_link = dict(zip(self.samples.tolist(), poses, strict=True))
+        small = _shrunk(camera, shrink)
+        assert small.K is not None
+        self._source, K, width, height = _canvas(small)
+        mesh = meshes[max(level for level in meshes if level <= shrink)]
+        self._renderer = Renderer(mesh, K, width, height)
+
+    def draw(self, sample: int, parent_T_camera: Array) -> Mask:
+        """Where (H, W) the robot is drawn for one sample; every call returns a new array."""
+        self._renderer.rasterise(se3.inverse(parent_T_camera) @ self._parent_T_link[sample])
+        drawn = self._renderer.face >= 0
+        return drawn if self._source is None else np.asarray(drawn[self._source])
+
+    def reach(self, sample: int, starts: Sequence[Array]) -> Mask:
+        """Where (H, W) the robot is drawn from any of several parent_T_camera."""
+        return np.asarray(np.logical_or.reduce([self.draw(sample, start) for start in starts]))
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """How far off a start may be: its camera centre, and its rotation."""
+
+    centre_m: float = 0.1
+    rotation_deg: float = 10.0
+    draws: int = 30
+
+    def around(self, start: Array) -> list[Array]:
+        """The start, then others (4, 4) exactly that far off in random directions, the same at every call."""
+        rng = np.random.default_rng(0)
+        found = [start]
+        for _ in range(self.draws):
+            axis, way = (v / np.linalg.norm(v) for v in rng.normal(size=(2, 3)))
+            turned = start[:3, :3] @ se3.so3_exp(np.deg2rad(self.rotation_deg) * axis)
+            found.append(se3.make(turned, start[:3, 3] + self.centre_m * way))
+        return found
+
+
+def _shrunk(camera: CameraModel, shrink: int) -> CameraModel:
+    assert camera.K is not None
+    K = shrunk_intrinsics(camera.K, 1 / shrink)
+    return CameraModel(camera.width // shrink, camera.height // shrink, K, camera.distortion)
+
+
+def _canvas(camera: CameraModel) -> tuple[tuple[NDArray[np.intp], NDArray[np.intp]] | None, Array, int, int]:
+    """For each pixel (H, W) of the image its row and column on a pinhole canvas; K, width, height of that canvas.
+
+    None instead of rows and columns when the image is the canvas. A barrel lens sees more than the pinhole of the same
+    size: the canvas is as wide as needed, up to `_WIDEST`.
+    """
+    assert camera.K is not None
+    width, height = camera.width, camera.height
+    if not camera.distortion.any():
+        return None, camera.K, width, height
+    v, u = np.mgrid[0:height, 0:width].astype(float)
+    rays = np.stack([u, v, np.ones_like(u)], -1) @ np.linalg.inv(camera.K).T
+    ideal = _undistorted(rays[..., :2], camera) @ camera.K[:2, :2].T + camera.K[:2, 2]
+    size = np.array([width, height])
+    margin = (_WIDEST - 1) / 2 * size
+    low = np.floor(np.maximum(ideal.min((0, 1)), -margin)).astype(int)
+    high = np.ceil(np.minimum(ideal.max((0, 1)), size - 1 + margin)).astype(int)
+    place = np.clip(np.rint(ideal), low, high).astype(int) - low
+    K = camera.K.copy()
+    K[:2, 2] -= low
+    return (place[..., 1], place[..., 0]), K, int(high[0] - low[0] + 1), int(high[1] - low[1] + 1)
+
+
+def _undistorted(points: Array, camera: CameraModel) -> Array:
+    """Ideal normalised coordinates of distorted ones, by fixed-point steps; where these diverge, off the canvas."""
+    assert camera.K is not None
+    found = points.copy()
+    for _ in range(_UNDISTORT_ROUNDS):
+        found -= distort(found, camera.distortion) - points
+    off_px = np.abs(distort(found, camera.distortion) - points).max(-1) * camera.K[0, 0]
+    found[~(off_px < _UNDISTORT_PX)] = np.inf
+    return found
