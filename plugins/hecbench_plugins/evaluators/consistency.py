@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.estimate import Estimate
-from hecbench.recording import CameraModel, Recording
+from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Column, EvaluatorSpec, Need, ResultSection
 from hecbench_plugins.markers.hand_eye import PosedSamples, carrier_T_target_per_sample, rotation_spread_deg
+from hecbench_plugins.markers.target_poses import rays
 
 Array = NDArray[np.float64]
 
@@ -67,7 +68,8 @@ def reconstruction_errors_m(parent_T_camera: Array, recording: Recording) -> Arr
     corners_px = corners_px[known]
     seen = np.asarray(np.isfinite(corners_px).all(-1))
     directions = np.full((*seen.shape, 3), np.nan)
-    directions[seen] = _rays(camera, corners_px[seen])
+    towards = rays(camera, corners_px[seen])
+    directions[seen] = towards / np.linalg.norm(towards, axis=1, keepdims=True)
     directions = np.einsum("nij,npj->npi", other_T_camera[:, :3, :3], directions)
     enough = seen.sum(0) >= _LEAST_RAYS
     if enough.sum() < _LEAST_RAYS:
@@ -80,15 +82,6 @@ def reconstruction_errors_m(parent_T_camera: Array, recording: Recording) -> Arr
     )
     pattern = target.points_m[enough]
     return np.asarray(np.linalg.norm(_aligned(pattern, points) - points, axis=1))
-
-
-def _rays(camera: CameraModel, pixels: Array) -> Array:
-    """Unit directions (M, 3) in the camera's frame of pixels (M, 2)."""
-    import cv2
-
-    undistorted = cv2.undistortPoints(pixels[:, None], camera.K, camera.distortion)[:, 0]
-    rays = np.c_[undistorted, np.ones(len(undistorted))]
-    return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
 
 
 def _nearest_to_rays(origins: Array, directions: Array) -> Array:

@@ -77,6 +77,17 @@ def project(camera: CameraModel, camera_T_target: Array, points_m: Array) -> Arr
     return np.asarray(pixels[:, 0])
 
 
+def rays(camera: CameraModel, pixels: Array) -> Array:
+    """Points (M, 3) at depth 1 in the camera's frame that pixels (M, 2) show, with the distortion undone."""
+    import cv2
+
+    until = (cv2.TERM_CRITERIA_MAX_ITER | cv2.TERM_CRITERIA_EPS, 100, 1e-10)
+    undistorted = cv2.undistortPointsIter(
+        pixels[:, None], camera.K, camera.distortion, np.eye(3), np.eye(3), until
+    )
+    return np.asarray(np.c_[undistorted[:, 0], np.ones(len(pixels))])
+
+
 def _pnp(points_m: Array, corners_px: Array, camera: CameraModel, planar: bool) -> list[tuple[Array, float]]:
     """Refined (camera_T_target, rms reprojection error px), best first: up to two for a planar target, else
     one.
