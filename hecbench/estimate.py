@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from hecbench import files, se3
 from hecbench.errors import InputError, InvalidAnswer
-from hecbench.recording import CameraModel, Mounting
+from hecbench.recording import OPENCV, CameraModel, Mounting
 
 Array = NDArray[np.float64]
 
@@ -103,6 +103,7 @@ class Estimate:
             "height": self.camera.height,
             "K": self.camera.K,
             "distortion": self.camera.distortion,
+            "distortion_model": self.camera.distortion_model,
         }
         content = {
             "schema": SCHEMA,
@@ -207,6 +208,7 @@ class _CameraJson(msgspec.Struct, forbid_unknown_fields=True):
     height: int
     K: list[list[float]] | None = None
     distortion: list[float] = []
+    distortion_model: str = OPENCV
 
 
 class _EstimateJson(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
@@ -254,7 +256,8 @@ def decode(content: bytes, source: str) -> Estimate:
             K = parsed.camera.K
             distortion = np.array(parsed.camera.distortion, float)
             size = parsed.camera.width, parsed.camera.height
-            values["camera"] = CameraModel(*size, None if K is None else np.array(K, float), distortion)
+            intrinsics = None if K is None else np.array(K, float)
+            values["camera"] = CameraModel(*size, intrinsics, distortion, parsed.camera.distortion_model)
         if parsed.covariance is not None:
             values["covariance"] = np.array(parsed.covariance, float)
         return Estimate(**values)

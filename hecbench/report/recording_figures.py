@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.estimate import Estimate
-from hecbench.recording import CameraModel, Mounting
-from hecbench.rendering.undistort import distort
+from hecbench.lens import project
+from hecbench.recording import Mounting
 from hecbench.report.svg import DARK, LIGHT, RED, panel, svg
 from hecbench.storage.evidence import Evidence
 from hecbench.workspace import apart_m, points_in_parent
@@ -22,15 +22,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
-
-
-def project(camera: CameraModel, points_c: Array) -> Array:
-    """Pixels (..., 2) of points (..., 3) m in the camera's frame; NaN behind the camera."""
-    assert camera.K is not None
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ideal = np.where(points_c[..., 2:] > 0, points_c[..., :2] / points_c[..., 2:], np.nan)
-    distorted = distort(ideal, camera.distortion)
-    return np.asarray(distorted @ camera.K[:2, :2].T + camera.K[:2, 2])
 
 
 def residuals_px(evidence: Evidence, estimate: Estimate) -> Array | None:

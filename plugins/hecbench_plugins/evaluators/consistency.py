@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.estimate import Estimate
-from hecbench.recording import Recording
+from hecbench.lens import normalised
+from hecbench.recording import CameraModel, Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Column, EvaluatorSpec, Need, ResultSection
 from hecbench_plugins.markers.hand_eye import PosedSamples, carrier_T_target_per_sample, rotation_spread_deg
-from hecbench_plugins.markers.target_poses import rays
 
 Array = NDArray[np.float64]
 
@@ -68,8 +68,7 @@ def reconstruction_errors_m(parent_T_camera: Array, recording: Recording) -> Arr
     corners_px = corners_px[known]
     seen = np.asarray(np.isfinite(corners_px).all(-1))
     directions = np.full((*seen.shape, 3), np.nan)
-    towards = rays(camera, corners_px[seen])
-    directions[seen] = towards / np.linalg.norm(towards, axis=1, keepdims=True)
+    directions[seen] = _rays(camera, corners_px[seen])
     directions = np.einsum("nij,npj->npi", other_T_camera[:, :3, :3], directions)
     enough = seen.sum(0) >= _LEAST_RAYS
     if enough.sum() < _LEAST_RAYS:
@@ -82,6 +81,12 @@ def reconstruction_errors_m(parent_T_camera: Array, recording: Recording) -> Arr
     )
     pattern = target.points_m[enough]
     return np.asarray(np.linalg.norm(_aligned(pattern, points) - points, axis=1))
+
+
+def _rays(camera: CameraModel, pixels: Array) -> Array:
+    """Unit directions (M, 3) in the camera's frame of pixels (M, 2)."""
+    rays = np.c_[normalised(camera, pixels), np.ones(len(pixels))]
+    return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
 
 
 def _nearest_to_rays(origins: Array, directions: Array) -> Array:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from hecbench import se3, statistics
 from hecbench.estimate import Estimate, Status
+from hecbench.lens import same
 from hecbench.recording import CameraModel, Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Column, EvaluatorSpec, Need, ResultSection
@@ -69,18 +70,11 @@ def held_out(
 
 def _seen_by(camera: CameraModel | None, recording: Recording) -> Recording:
     """The recording as another camera sees it: the same corners, the target poses that follow from them with it."""
-    if camera is None or not _has_pixels(recording) or _same(camera, recording.camera):
+    known = recording.camera
+    if camera is None or known is None or not _has_pixels(recording) or same(camera, known):
         return recording
     other = replace(recording, camera=camera, camera_T_target=None)
     return replace(other, camera_T_target=target_poses(other))
-
-
-def _same(camera: CameraModel, other: CameraModel | None) -> bool:
-    return (
-        other is not None
-        and np.array_equal(camera.K, other.K)  # type: ignore[arg-type]  # None equals None
-        and np.array_equal(camera.distortion, other.distortion)
-    )
 
 
 def refit_target(parent_T_camera: Array, recording: Recording) -> Array:

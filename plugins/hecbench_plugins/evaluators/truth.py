@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.estimate import Estimate
+from hecbench.lens import normalised, project, same
 from hecbench.recording import Mounting, Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Column, EvaluatorSpec, ResultSection
 from hecbench.workspace import apart_m, points_in_parent
-from hecbench_plugins.markers.target_poses import project, rays
 
 Array = NDArray[np.float64]
 
@@ -61,17 +61,17 @@ def pair_error_m(estimate: Estimate, recording: Recording, points_m: Array) -> f
     assert true is not None
     if true_camera is None or camera is None or true_camera.K is None or camera.K is None:
         return None
-    if np.array_equal(camera.K, true_camera.K) and np.array_equal(camera.distortion, true_camera.distortion):
+    if same(camera, true_camera):
         return float(apart_m(estimated, true, points_m))
     in_camera = se3.transform_points(se3.inverse(true), points_m)
     points_m, in_camera = points_m[in_camera[:, 2] > 0], in_camera[in_camera[:, 2] > 0]
     if not len(in_camera):
         return None
-    pixels = project(true_camera, np.eye(4), in_camera)
+    pixels = project(true_camera, in_camera)
     inside = ((pixels >= 0) & (pixels <= [true_camera.width - 1, true_camera.height - 1])).all(1)
     if not inside.any():
         return None
-    seen_again = in_camera[inside, 2:] * rays(camera, pixels[inside])
+    seen_again = in_camera[inside, 2:] * np.c_[normalised(camera, pixels[inside]), np.ones(inside.sum())]
     displacements_m = se3.transform_points(estimated, seen_again) - points_m[inside]
     return float(np.sqrt((displacements_m**2).sum(1).mean()))
 
