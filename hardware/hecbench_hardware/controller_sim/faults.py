@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hecbench.se3 import Array
-from hecbench_hardware.controller_sim.arm import HOME_RAD
+from hecbench_hardware.controller_sim.arm import HOME_RAD, pose_of
 from hecbench_hardware.controller_sim.dashboard import Dashboard
 from hecbench_hardware.controller_sim.robotiq import RobotiqSocket
 
@@ -43,6 +43,7 @@ class Faults:
             "contact": lambda x: setattr(arm, "contact_plane_m", x[0]),
             "push": lambda x: setattr(arm, "external_force_n", x[0]),
             "place": self._place,
+            "tool": lambda x: self._set_tool(_six(x)),
             "hand": lambda x: program.push_by_hand(_six(x)),
             "program": lambda _: program.load("def other():\n sleep(3600)\nend\n"),
             "end_program": lambda _: program.kill(),
@@ -80,6 +81,10 @@ class Faults:
 
     def _place(self, joints_rad: list[float]) -> None:
         self.dashboard.program.arm.joints = _six(joints_rad)
+
+    def _set_tool(self, offset: Array) -> None:
+        arm = self.dashboard.program.arm
+        arm.tcp_offset, arm.flange_T_tcp = offset, pose_of(offset)
 
     def _local_mode(self) -> None:
         self.dashboard.remote = False
