@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hecbench import se3
+from hecbench import pictures, se3
 from hecbench.errors import InputError, Refusal
 from hecbench.targets import Target
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
+_Value = TypeVar("_Value", np.uint8, np.bool_)
 ImageSource = Path | Image | None
 """A file that is decoded when asked for, an array in memory, or nothing for this sample."""
 
@@ -117,7 +118,7 @@ class Recording:
         corners_px: (N, P, 2), one row per target point.
         robot_stamp_s, camera_stamp_s: (N,).
         images: N sources of (height, width, 3) RGB.
-        masks: N sources of (height, width), above 127 = robot.
+        masks: N sources of (height, width), above 127 = robot, or 0 and 1.
         folder: where it was read from, None when generated.
         notes: what its importer found out about its conventions, to be said to the user; not saved.
     """
@@ -268,28 +269,30 @@ class Recording:
         return replace(self, truth_parent_T_camera=None)
 
     def image(self, index: int) -> Image:
-        """Decode one image, (height, width, 3) RGB.
+        """Decode one image, (height, width, 3) RGB, as `pictures.image` reads it.
 
         Raises:
             InputError: it is absent, unreadable, or not of the camera's size.
         """
-        return self._picture("images", index, "RGB")
+        return self._picture("images", index, pictures.image)
 
     def mask(self, index: int) -> NDArray[np.bool_]:
-        """Decode one mask, (height, width), True on the robot.
+        """Decode one mask, (height, width), True on the robot, as `pictures.mask` reads it.
 
         Raises:
             InputError: it is absent, unreadable, or not of the camera's size.
         """
-        return self._picture("masks", index, "L") > 127
+        return self._picture("masks", index, pictures.mask)
 
-    def _picture(self, name: str, index: int, mode: str) -> Image:
+    def _picture(
+        self, name: str, index: int, decode: Callable[[Path | Image, str], NDArray[_Value]]
+    ) -> NDArray[_Value]:
         sources = getattr(self, name)
         source = sources[index] if sources else None
         where = f"samples[{index}].{name.removesuffix('s')}"
         if source is None:
             raise InputError(f"{self.name}: {where}: there is none")
-        picture = _decode(source, mode) if isinstance(source, Path) else source
+        picture = decode(source, str(source) if isinstance(source, Path) else f"{self.name}: {where}")
         if self.camera and picture.shape[:2] != (self.camera.height, self.camera.width):
             height, width = picture.shape[:2]
             raise InputError(
@@ -345,16 +348,6 @@ def _rigid(poses: Array, name: str) -> Array:
         poses = poses.copy()
         poses[rounded, :3, :3] = se3.nearest_rotation(poses[rounded, :3, :3])
     return poses
-
-
-def _decode(path: Path, mode: str) -> Image:
-    from PIL import Image as PillowImage
-
-    try:
-        with PillowImage.open(path) as picture:
-            return np.asarray(picture.convert(mode))
-    except (OSError, SyntaxError, ValueError) as error:  # Pillow raises all three on damaged files
-        raise InputError(f"{path}: cannot be read as an image ({error}); restore the file") from error
 
 
 def _update(digest: Any, value: Any) -> None:

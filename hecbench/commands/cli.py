@@ -254,17 +254,17 @@ def report(folder: Path, as_json: bool) -> None:
 
 @cli.command()
 @click.argument("name")
+@click.option("--kind", help="Of plugins of one name, the one of this kind: solver, segmenter, dataset, ...")
 @_json
-def conformance(name: str, as_json: bool) -> None:
-    """Run the plugin author's checks on the solver NAME."""
+def conformance(name: str, kind: str | None, as_json: bool) -> None:
+    """Run the plugin author's checks on the plugin NAME."""
     from dataclasses import asdict
 
     from hecbench import registry
-    from hecbench.conformance import check_solver
+    from hecbench.conformance import check_plugin
     from hecbench.report.tables import Table
-    from hecbench.specs import Kind, SolverSpec
 
-    checks = check_solver(registry.load().get(Kind.SOLVER, name, SolverSpec))
+    checks = check_plugin(registry.load().named(name, kind))
     if as_json:
         console.print_json([asdict(check) for check in checks])
     else:

@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import files
+from hecbench import files, pictures
 from hecbench.errors import InputError
 from hecbench.estimate import plain
 from hecbench.recording import CameraModel, ImageSource, Mounting, Recording, RobotDescription
@@ -112,12 +112,13 @@ def is_recording(path: Path) -> bool:
     return (path / FILE_NAME).is_file() or (path.is_file() and path.name == FILE_NAME)
 
 
-def load(path: Path) -> Recording:
+def load(path: str | Path) -> Recording:
     """Read a recording folder (or its JSON file). No image is decoded, and images may be absent.
 
     Raises:
         InputError: with the file, the key, the value and the cure.
     """
+    path = Path(path)
     file = path if path.name == FILE_NAME and not path.is_dir() else path / FILE_NAME
     content = files.read_bytes(file)
     try:
@@ -263,11 +264,12 @@ def _inside(folder: Path, key: str, name: str) -> Path:
     return path
 
 
-def save(recording: Recording, folder: Path) -> None:
+def save(recording: Recording, folder: str | Path) -> None:
     """Write a recording folder; images and masks in memory or elsewhere are stored as PNG or copied in.
 
     The JSON file is written last and atomically, so a folder with `recording.json` is complete.
     """
+    folder = Path(folder)
     images = _store_pictures(recording.images, folder, "images", recording.sample_ids)
     masks = _store_pictures(recording.masks, folder, "masks", recording.sample_ids)
     samples = [
@@ -339,7 +341,9 @@ def _store_pictures(
             names.append(None)
         elif isinstance(source, np.ndarray):
             name = _free_name(kind, f"{files.safe_name(sample_id)}.png", taken)
-            files.write_bytes(folder / name, encode_png(source))
+            where = f"samples[{len(names)}].{kind.removesuffix('s')}"
+            picture = pictures.image(source, where) if kind == "images" else _mask_picture(source, where)
+            files.write_bytes(folder / name, encode_png(picture))
             names.append(name)
         else:
             if source not in stored:
@@ -347,6 +351,10 @@ def _store_pictures(
                 files.write_bytes(folder / stored[source], files.read_bytes(source))
             names.append(stored[source])
     return names
+
+
+def _mask_picture(mask: NDArray[Any], where: str) -> NDArray[np.uint8]:
+    return pictures.mask(mask, where).astype(np.uint8) * np.uint8(255)
 
 
 def _free_name(kind: str, name: str, taken: set[str]) -> str:

@@ -83,8 +83,7 @@ def undistorted_canvas(recording: Recording, robot: PosedRobot) -> Canvas:
     def one(row: int) -> Images:
         import cv2
 
-        image = _eight_bit(np.asarray(recording.image(row)), f"samples[{row}]")
-        return np.asarray(cv2.remap(image, *maps, cv2.INTER_LINEAR), np.uint8)
+        return np.asarray(cv2.remap(recording.image(row), *maps, cv2.INTER_LINEAR), np.uint8)
 
     images = np.stack(threads.each(one, rows))
     if (shrink := int(np.ceil(images.shape[2] / _LARGEST_PX))) > 1:
@@ -94,14 +93,6 @@ def undistorted_canvas(recording: Recording, robot: PosedRobot) -> Canvas:
     flange = None if at_flange else robot.model.link_index(robot.flange_link)
     samples = tuple(recording.sample_ids[row] for row in rows)
     return Canvas(K, images, valid, joints[rows], robot.link_poses(joints[rows]), flange, samples)
-
-
-def _eight_bit(image: NDArray[np.generic], where: str) -> Images:
-    if image.dtype == np.uint8:
-        return np.ascontiguousarray(image, np.uint8)
-    if not np.isfinite(image).all():
-        raise Refusal(f"{where}: the image holds values that are not finite")
-    return np.asarray(np.round(255 * np.clip(np.asarray(image, float), 0, 1)), np.uint8)
 
 
 def _lens(
