@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
+from threading import get_ident
 from typing import Any
 
 import numpy as np
@@ -38,14 +39,14 @@ def detected(grey: NDArray[np.uint8], family: str, decimate: float = 1.0) -> lis
     """Every credible tag of a family in a picture (H, W), searched at 1/`decimate` of its size."""
     return [
         Tag(int(tag.tag_id), np.asarray(tag.corners, float) - 0.5, float(tag.decision_margin))
-        for tag in detector(family, decimate).detect(np.ascontiguousarray(grey))
+        for tag in detector(family, decimate, get_ident()).detect(np.ascontiguousarray(grey))
         if tag.hamming <= _MOST_WRONG_BITS and tag.decision_margin > _LEAST_MARGIN
     ]
 
 
 @cache
-def detector(family: str, decimate: float) -> Any:
-    """A detector that lives until the process ends, and is never freed.
+def detector(family: str, decimate: float, thread: int) -> Any:
+    """A thread's own detector, which no two of them can use at once. It lives until the process ends, never freed.
 
     The library's own destructor frees the tag family before the detector that still uses it, which corrupts the heap.
     """

@@ -145,6 +145,8 @@ def plugins(kind: str | None, as_json: bool) -> None:
     help="Predict left-out samples; default: where truth is not given.",
 )
 @click.option("--out", type=_folder, help="Write each estimate to DIR/<solver>.json.")
+@console.threads
+@console.no_cache
 @_seed
 @_json
 def solve(
@@ -198,6 +200,7 @@ def solve(
 @click.option("--jobs", type=int, default=1, show_default=True, help="Worker processes; -1: one per core.")
 @click.option("--executor", metavar="URL", help="A dask scheduler, tcp://host:port, instead of --jobs.")
 @click.option("--resume", is_flag=True, help="Go on with what --out holds.")
+@console.no_cache
 @_seed
 @_json
 def run(
@@ -291,6 +294,8 @@ def doctor(as_json: bool) -> None:
 
 @cli.command()
 @click.argument("recording", type=_any_path)
+@console.threads
+@console.no_cache
 @_json
 def check(recording: Path, as_json: bool) -> None:
     """ViewInformation for faults in a RECORDING before anything is solved; exits with 3 on a critical one."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -9,11 +10,30 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from hecbench import cache
+from hecbench import threads as limits
+
 if TYPE_CHECKING:
     from hecbench.estimate import Estimate
     from hecbench.report.tables import Table
 
 _PIPE_WIDTH = 200
+
+
+no_cache = click.option(
+    "--no-cache",
+    is_flag=True,
+    expose_value=False,
+    callback=lambda context, option, value: os.environ.update({cache.VARIABLE: "1"} if value else {}),
+    help="Detect the target again, also where the cache has it.",
+)
+threads = click.option(
+    "--jobs",
+    type=click.IntRange(min=1),
+    expose_value=False,
+    callback=lambda context, option, value: None if value is None else limits.limit(value),
+    help="At most so many threads; default: one per core. The answer is the same.",
+)
 
 
 def print_json(value: Any) -> None:

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from hecbench import threads
 from hecbench.errors import InputError, Refusal
 from hecbench.recording import CameraModel, Recording
 from hecbench.rendering.undistort import shrunk_intrinsics
 from hecbench.robots.posed import PosedRobot
-from hecbench_plugins import threads
 
 Array = NDArray[np.float64]
 Images = NDArray[np.uint8]
