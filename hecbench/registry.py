@@ -15,7 +15,7 @@ from functools import cache
 from importlib import import_module, metadata
 from importlib.util import find_spec
 from types import ModuleType
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import pluggy
 
@@ -24,6 +24,8 @@ from hecbench.errors import InputError
 from hecbench.specs import AnySpec, Kind, SolverSpec, Spec
 
 hookimpl = pluggy.HookimplMarker(hookspecs.GROUP)
+
+OWN_DISTRIBUTION = "hecbench"
 
 TrialObserver = Callable[..., object]
 """Called as `observer(trial=TrialRecord)`."""
@@ -89,6 +91,14 @@ class Registry:
         specs = [plugin.spec for plugin in self.select(kind) if plugin.status is PluginStatus.READY]
         return [spec for spec in specs if isinstance(spec, spec_type)]
 
+    def is_foreign(self, solver: str) -> bool:
+        """Whether the solver of that name, options set in it or not, comes from another distribution than ours."""
+        plain, _ = _settings(solver)
+        return any(
+            plugin.kind is Kind.SOLVER and plugin.name == plain and plugin.distribution != OWN_DISTRIBUTION
+            for plugin in self.plugins
+        )
+
     def get(self, kind: Kind, name: str, spec_type: type[AnySpecT]) -> AnySpecT:
         """The ready spec of that name; otherwise an `InputError` that says why not and what there is.
 
@@ -103,6 +113,17 @@ class Registry:
         if plugin.status is not PluginStatus.READY or not isinstance(plugin.spec, spec_type):
             raise InputError(f"{kind} '{plain}' is {plugin.status}: {plugin.detail}")
         return plugin.spec.configured(settings) if isinstance(plugin.spec, SolverSpec) else plugin.spec
+
+    def named(self, name: str, kind: str | None = None) -> AnySpec:
+        """The ready spec of that name, of any kind; an `InputError` when plugins of several kinds have the name."""
+        if kind is not None and kind not in list(Kind):
+            raise InputError(f"--kind {kind}: choose one of {', '.join(Kind)}")
+        plain = name.partition("[")[0]
+        kinds = [plugin.kind for plugin in self.plugins if plugin.name == plain and plugin.kind is not None]
+        if kind is None and len(set(kinds)) > 1:
+            raise InputError(f"'{plain}' is a {' and a '.join(kinds)}: name one with --kind")
+        wanted = Kind(kind) if kind is not None else next(iter(kinds), Kind.SOLVER)
+        return cast("AnySpec", self.get(wanted, name, Spec))
 
 
 def _settings(name: str) -> tuple[str, dict[str, str]]:

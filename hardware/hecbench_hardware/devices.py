@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from hecbench.errors import HecbenchError
 from hecbench.recording import CameraModel, Recording
 from hecbench.se3 import Array
-from hecbench_hardware.kinematics import UrArm
-from hecbench_hardware.limits import Limits
+from hecbench_hardware.kinematics import Arm
+from hecbench_hardware.limits import Limits, Sphere
 
 
 class Fault(StrEnum):
@@ -100,8 +100,13 @@ class Robot(Protocol):
 
     name: str
     simulated: bool
-    arm: UrArm
     limits: Limits
+    """Bounds of every motion, with everything that the flange carries."""
+
+    @property
+    def arm(self) -> Arm:
+        """Its kinematics."""
+        ...
 
     @property
     def enabled(self) -> bool:
@@ -110,6 +115,10 @@ class Robot(Protocol):
 
     def enable(self) -> None:
         """Take control. Only `arming.take_control` calls this, so that nothing moves unasked."""
+        ...
+
+    def carry(self, balls: tuple[Sphere, ...]) -> None:
+        """Check every motion for these balls of the flange frame too, a gripper's."""
         ...
 
     def state(self) -> RobotState:

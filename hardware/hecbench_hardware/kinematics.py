@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from itertools import product
 from math import asin, atan2, cos, hypot, pi, sin, sqrt
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -32,6 +33,27 @@ _REACH_TOLERANCE = 1e-10
 _WRIST_SINGULAR = 1e-9
 
 
+class Arm(Protocol):
+    """The kinematics of an arm with six revolute joints. `base` and `flange` are the frames of its driver."""
+
+    @property
+    def name(self) -> str:
+        """Of the model."""
+        ...
+
+    def link_frames(self, joints_rad: ArrayLike) -> Array:
+        """base_T_link (..., 6, 4, 4) after each joint, for joints (..., 6) rad; the last is base_T_flange."""
+        ...
+
+    def forward(self, joints_rad: ArrayLike) -> Array:
+        """base_T_flange (..., 4, 4) of joints (..., 6) rad."""
+        ...
+
+    def inverse(self, base_T_flange: ArrayLike, near_rad: ArrayLike | None = None) -> Array:
+        """Joint solutions (K, 6) rad of a flange pose (4, 4), nearest to `near_rad` (6,) first; none: out of reach."""
+        ...
+
+
 @dataclass(frozen=True)
 class UrArm:
     """One arm of the e-series. Frames: `base` is the controller's base, `flange` its tool flange (tool0)."""
@@ -43,11 +65,6 @@ class UrArm:
     """d1, d4, d5, d6."""
     joint_range_rad: float = 2 * pi
     """Every joint turns from minus to plus this angle."""
-
-    @property
-    def reach_m(self) -> float:
-        """Upper bound of the distance from the shoulder to the flange."""
-        return -sum(self.a_m) + sum(self.d_m[1:])
 
     def link_frames(self, joints_rad: ArrayLike) -> Array:
         """base_T_link (..., 6, 4, 4) after each joint, for joints (..., 6) rad; the last is base_T_flange."""

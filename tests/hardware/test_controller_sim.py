@@ -11,9 +11,11 @@ import rtde_control
 import rtde_io
 import rtde_receive
 from hecbench_hardware.controller_sim.arm import SimulatedArm
+from hecbench_hardware.controller_sim.control_script import DONE
 from hecbench_hardware.controller_sim.process import SimulatedController
-from hecbench_hardware.controller_sim.program import DONE, ProgramRunner
+from hecbench_hardware.controller_sim.program import ProgramRunner
 from hecbench_hardware.controller_sim.server import serve
+from hecbench_hardware.controller_sim.urscript.uploads import start_program
 from hecbench_hardware.kinematics import ARMS
 
 from hecbench.errors import InputError
@@ -231,11 +233,11 @@ def test_a_motion_is_a_function_of_cycles(time_scale):
     def trajectory():
         program = ProgramRunner(SimulatedArm(ARMS["ur5e"]))
         program.arm.dt_s *= time_scale
-        program.load("def rtde_control():\nend\n")
-        program.arm.double_inputs[:8] = [*READY, 0.5, 1.0]
-        program.arm.int_inputs[0] = 1
+        start_program(program, "def rtde_control():\nend\n")
+        program.arm.io.inputs.doubles[:8] = [*READY, 0.5, 1.0]
+        program.arm.io.inputs.ints[0] = 1
         joints = []
-        while program.arm.int_outputs[0] != DONE:
+        while program.arm.io.outputs.ints[0] != DONE:
             program.step()
             joints.append(program.arm.joints)
         return np.array(joints)
@@ -264,7 +266,7 @@ def raw(controller):
 
 def test_wire_protocol(raw, controller):
     assert raw("V", struct.pack(">H", 2)) == b"\x01"
-    assert raw("V", struct.pack(">H", 1)) == b"\x00"
+    assert raw("V", struct.pack(">H", 3)) == b"\x00"
     assert struct.unpack(">4I", raw("v", b"")) == (5, 11, 6, 0)
     assert raw("S", b"") == b"\x00"
     assert raw("O", struct.pack(">d", 100) + b"timestamp,nonsense") == b"\x00DOUBLE,NOT_FOUND"

@@ -7,9 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hecbench_hardware.cameras.images import ImageFolder
+from hecbench_hardware.clearance import check_motion
 from hecbench_hardware.devices import DeviceFault, Fault
 from hecbench_hardware.kinematics import ARMS
-from hecbench_hardware.limits import Box, Limits, check_path, joint_path
+from hecbench_hardware.limits import Box, Limits
+from hecbench_hardware.motions import JointMotion
 from hecbench_hardware.recorder.plan import check_plan, dry_run, write_plan
 from hecbench_hardware.recorder.poses import Criterion, View, diverse_plan, informative_plan
 from hecbench_hardware.recorder.record import Recorder
@@ -205,7 +207,7 @@ def test_diverse_plan(cell, ready_pose):
     assert np.array_equal(planned.joints_rad, again.joints_rad)
     assert np.array_equal(planned.joints_rad[0], ready_pose)
     for start, end in zip(planned.joints_rad, planned.joints_rad[1:], strict=False):
-        check_path(ARM, joint_path(start, end), limits)
+        check_motion(ARM, JointMotion(ARM, start, end), limits)
 
     def hands(joints):
         poses = ARM.forward(joints)
@@ -265,7 +267,7 @@ def test_informative_plan(markerless, ready_pose, criterion):
     assert np.array_equal(planned.joints_rad[0], ready_pose)
     assert len(planned) == 5
     for start, end in zip(planned.joints_rad, planned.joints_rad[1:], strict=False):
-        check_path(ARM, joint_path(start, end), limits)
+        check_motion(ARM, JointMotion(ARM, start, end), limits)
     view = RobotView(markerless)
     for joints in planned.joints_rad[1:]:
         assert view.look(joints, markerless.initial_parent_T_camera).in_view >= 0.6

@@ -14,7 +14,8 @@ from hecbench_hardware.arming import take_control
 from hecbench_hardware.controller_sim.process import SimulatedController
 from hecbench_hardware.devices import DeviceFault, Fault
 from hecbench_hardware.kinematics import ARMS
-from hecbench_hardware.limits import Box, Limits
+from hecbench_hardware.limits import Box, Limits, Sphere
+from hecbench_hardware.motions import LineMotion
 from hecbench_hardware.ur.dashboard import Dashboard
 from hecbench_hardware.ur.outputs import Outputs
 from hecbench_hardware.ur.robot import UrRobot
@@ -120,6 +121,92 @@ def test_a_path_through_a_forbidden_box_is_refused(connect, ready_pose):
     robot.enable()
     with pytest.raises(InputError, match="keep-out box"):
         robot.move_joints([1.0, *robot.state().joints_rad[1:]])
+
+
+LONG_TOOL = [0.0, 0.0, 0.45, 0.0, 0.0, 0.0]
+
+
+@pytest.fixture
+def swinging(connect, controller, ready_pose):
+    """A controller taken for a real one, with a long tool, and a flange pose half a turn of the tool's tip away."""
+    controller.fault("unmarked")
+    robot = connect(limits=Limits(workspace=Box((-1.5, -1.5, -0.5), (1.5, 1.5, 2.0))))
+    robot.enable()
+    robot._request("call", "setTcp", LONG_TOOL)
+    assert robot.recover(lambda line: True)
+    robot.move_joints(ready_pose)
+    base_T_tcp = robot.settle().base_T_tcp
+    before, after = (
+        se3.make(se3.so3_exp([0.0, turn, 0.0]) @ base_T_tcp[:3, :3], base_T_tcp[:3, 3])
+        @ se3.inverse(robot.flange_T_tcp)
+        for turn in (-0.5, 0.5)
+    )
+    robot.move_joints(robot.arm.inverse(before, ready_pose)[0])
+    robot.settle()
+    return robot, after
+
+
+def test_the_arc_of_a_long_tool_is_kept_out_of_a_wall(swinging):
+    """A wall above the arc is fine, one between the arc and its ends is not."""
+    robot, target = swinging
+    line = LineMotion(robot.arm, robot.state().joints_rad, target, robot.flange_T_tcp)
+    top_m = robot.arm.forward(line.joints)[:, 2, 3].max()
+    ends_m = robot.arm.forward(line.joints[[0, -1]])[:, 2, 3].max()
+    assert top_m > ends_m + 0.01, "the arc rises above both of its ends"
+    before = robot.state().joints_rad
+    for wall_m, fits in ((top_m + 0.061, True), ((top_m + ends_m) / 2 + 0.06, False)):
+        robot.limits = Limits(workspace=Box((-1.5, -1.5, -0.5), (1.5, 1.5, wall_m)))
+        if fits:
+            robot.move_linear(target)
+            robot.move_linear(robot.arm.forward(before))
+            before = robot.settle().joints_rad
+            continue
+        with pytest.raises(InputError, match="leaves the workspace"):
+            robot.move_linear(target)
+    assert np.array_equal(robot.settle().joints_rad, before)
+
+
+def test_the_tip_of_a_tool_is_part_of_the_limits_before_control_is_taken(swinging, connect):
+    watcher = connect()
+    for robot in (swinging[0], watcher):
+        furthest = max(ball.centre_m[2] for ball in robot.limits.tool)
+        assert furthest == pytest.approx(0.45)
+        robot.carry((Sphere((0.0, 0.0, 0.6), 0.02),))
+        assert robot.limits.tool[-1].centre_m[2] == pytest.approx(0.45)
+        assert Sphere((0.0, 0.0, 0.6), 0.02) in robot.limits.tool
+
+
+def test_a_tool_that_was_changed_since_is_refused(swinging, ready_pose):
+    robot, target = swinging
+    before = robot.state().base_T_tcp
+    robot._request("call", "setTcp", [0, 0, 0.2, 0, 0, 0])
+    wait_until(lambda: se3.translation_error_m(robot.state().base_T_tcp, before) > 0.1)
+    for move in (lambda: robot.move_linear(target), lambda: robot.move_joints(ready_pose)):
+        with pytest.raises(InputError, match=r"the tool centre point is 0\.250 m from"):
+            move()
+
+
+@pytest.mark.parametrize(
+    ("settings", "complaint"),
+    [
+        ({"limits": Limits(joint_speed_rad_s=1.1)}, "joint_speed_rad_s 1.1 is above"),
+        ({"limits": Limits(tool_speed_m_s=0.6)}, "tool_speed_m_s 0.6 is above"),
+        ({"supervision": Supervision(max_age_s=1.1)}, "max_age_s=1.1 is above"),
+        ({"supervision": Supervision(max_force_n=200)}, "max_force_n=200 is above"),
+    ],
+)
+def test_a_real_arm_is_not_driven_faster_or_blinder_than_the_caps(connect, controller, settings, complaint):
+    connect(**settings)
+    controller.fault("unmarked")
+    with pytest.raises(InputError, match=complaint):
+        connect(**settings)
+
+
+def test_supervision_that_stops_always_is_refused():
+    for name in ("max_age_s", "max_force_n", "late_s"):
+        for value in (0.0, -1.0, float("nan")):
+            with pytest.raises(InputError, match=f"{name}=.* above 0"):
+                Supervision(**{name: value})
 
 
 def test_stop_from_another_thread(robot, ready_pose):

@@ -86,7 +86,6 @@ def open_camera(options: Mapping[str, str]) -> LabCamera:
     from hecbench.storage import recording_io
     from hecbench_hardware.lab import cells
     from hecbench_hardware.lab.eye import Eye, Sensor
-    from hecbench_hardware.lab.scene import Scene
 
     station = cells.station(options.get("arm", "ur5e"), options.get("urdf"))
     calibration = int(number(options, "calibration", 0))
@@ -101,15 +100,7 @@ def open_camera(options: Mapping[str, str]) -> LabCamera:
             cell.initial_parent_T_camera if cell.initial_parent_T_camera is not None else base_T_camera
         )
     sensor = Sensor(int(number(options, "supersample", 2)), number(options, "noise", 0.0))
-    scene = Scene(
-        station.robot,
-        joint_names=station.joint_names,
-        base_link=station.base_link,
-        flange_link=station.flange_link,
-        gripper=None if station.draws_gripper_meshes else station.gripper,
-        flange_tag=station.flange_tag(calibration),
-        surroundings=station.surroundings,
-    )
+    scene = station.scene(flange_tag=station.flange_tag(calibration))
     seed = int(number(options, "seed", 0))
     return LabCamera(Eye(scene, model, sensor), base_T_camera, station.home_rad, seed)
 

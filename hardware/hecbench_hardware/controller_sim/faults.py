@@ -15,6 +15,10 @@ from hecbench.se3 import Array
 from hecbench_hardware.controller_sim.arm import HOME_RAD
 from hecbench_hardware.controller_sim.dashboard import Dashboard
 from hecbench_hardware.controller_sim.robotiq import RobotiqSocket
+from hecbench_hardware.controller_sim.urscript.uploads import start_program
+
+_FAR_M, _STRONG_N = 10.0, 1e4
+"""What contact planes and pushes are limited to."""
 
 
 @dataclass
@@ -35,20 +39,22 @@ class Faults:
             "protective_stop": lambda _: arm.protective_stop("injected"),
             "emergency_stop": lambda _: arm.emergency_stop(),
             "release_emergency_stop": lambda _: arm.release_emergency_stop(),
-            "link_loss": lambda x: setattr(self, "link_back_s", time.monotonic() + x[0]),
+            "link_loss": lambda x: setattr(
+                self, "link_back_s", time.monotonic() + _within(x[0], 0.0, 3600.0)
+            ),
             "local_mode": lambda _: self._local_mode(),
-            "slow": lambda x: setattr(arm, "slowdown", x[0]),
+            "slow": lambda x: setattr(arm, "slowdown", _within(x[0], 0.0, 1000.0)),
             "stale": lambda _: setattr(self, "stream_frozen", True),
             "unreachable": lambda _: setattr(arm, "nothing_reachable", True),
-            "contact": lambda x: setattr(arm, "contact_plane_m", x[0]),
-            "push": lambda x: setattr(arm, "external_force_n", x[0]),
+            "contact": lambda x: setattr(arm, "contact_plane_m", _within(x[0], -_FAR_M, _FAR_M)),
+            "push": lambda x: setattr(arm, "external_force_n", _within(x[0], -_STRONG_N, _STRONG_N)),
             "place": self._place,
-            "hand": lambda x: program.push_by_hand(_six(x)),
-            "program": lambda _: program.load("def other():\n sleep(3600)\nend\n"),
+            "hand": lambda x: program.push_by_hand(self._six(x)),
+            "program": lambda _: start_program(program, "def other():\n sleep(3600)\nend\n"),
             "end_program": lambda _: program.kill(),
             "gripper_jam": lambda _: setattr(self.gripper, "jammed", True),
             "gripper_silent": lambda _: setattr(self.gripper, "silent", True),
-            "gripper_object": lambda x: setattr(self.gripper, "object_at", int(x[0])),
+            "gripper_object": lambda x: setattr(self.gripper, "object_at", int(_within(x[0], 0, 255))),
             "unmarked": lambda _: setattr(self.dashboard, "marked", False),
             "reset": lambda _: self._reset(),
         }
@@ -79,26 +85,33 @@ class Faults:
         return "ok"
 
     def _place(self, joints_rad: list[float]) -> None:
-        self.dashboard.program.arm.joints = _six(joints_rad)
+        self.dashboard.program.arm.joints = self._six(joints_rad)
+
+    def _six(self, joints_rad: list[float]) -> Array:
+        if len(joints_rad) != len(HOME_RAD):
+            raise ValueError
+        limit = self.dashboard.program.arm.arm.joint_range_rad
+        return np.array([_within(value, -limit, limit) for value in joints_rad])
 
     def _local_mode(self) -> None:
-        self.dashboard.remote = False
+        self.dashboard.program.remote = False
         self.dashboard.program.kill()
 
     def _reset(self) -> None:
         """A controller as it was at the start, at the home pose."""
         program, arm = self.dashboard.program, self.dashboard.program.arm
         program.kill()
+        self.dashboard.loaded = ""
         fresh = type(arm)(arm.arm)
         fresh.time_s, fresh.dt_s = arm.time_s, arm.dt_s
         vars(arm).update(vars(fresh))
         arm.joints = np.array(HOME_RAD)
         vars(self.gripper).update(vars(RobotiqSocket()))
-        self.dashboard.remote = self.dashboard.marked = True
+        program.remote = self.dashboard.marked = True
         self.stream_frozen, self.link_back_s = False, 0.0
 
 
-def _six(joints_rad: list[float]) -> Array:
-    if len(joints_rad) != len(HOME_RAD):
+def _within(value: float, low: float, high: float) -> float:
+    if not low <= value <= high:
         raise ValueError
-    return np.array(joints_rad)
+    return value

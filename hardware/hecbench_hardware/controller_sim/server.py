@@ -1,11 +1,14 @@
-"""The simulated controller's process: one thread, one selector, five kinds of port, 500 cycles a second.
+"""The simulated controller's process: one thread, one selector, its ports, 500 cycles a second.
 
 The wall clock only paces the cycles; each advances the controller's own time by the same step, so a motion
-depends on the cycle at which its command arrived, never on how busy the machine is.
+depends on the cycle at which its command arrived, never on how busy the machine is. Whatever one client sends
+can cost that client its connection, never another one, never the process.
 """
 
 from __future__ import annotations
 
+import errno
+import os
 import re
 import selectors
 import signal
@@ -18,29 +21,34 @@ from typing import IO
 
 from hecbench.errors import InputError
 from hecbench_hardware.controller_sim.arm import SimulatedArm
+from hecbench_hardware.controller_sim.channel import Channel, Finished, LineChannel, Refused
+from hecbench_hardware.controller_sim.client_interfaces import SCRIPT_PORTS, ClientInterfaces
 from hecbench_hardware.controller_sim.dashboard import GREETING, Dashboard
 from hecbench_hardware.controller_sim.faults import Faults
 from hecbench_hardware.controller_sim.program import CYCLE_S, ProgramRunner
 from hecbench_hardware.controller_sim.robotiq import RobotiqSocket
-from hecbench_hardware.controller_sim.rtde import RtdeSession, output_values
+from hecbench_hardware.controller_sim.rtde import RtdeSession
 from hecbench_hardware.kinematics import arm_named
 
-SCRIPT_PORTS = (30001, 30002, 30003)
 DASHBOARD_PORT = 29999
 RTDE_PORT = 30004
 GRIPPER_PORT = 63352
 FAULT_PORT = 30099
 VERSION = (5, 11, 6, 0)
+_BACKLOG = 512
 _LATE_CYCLES = 10
+_READ_BYTES = 65536
 _SLOW_READER_BYTES = 65536
+"""A client this far behind misses stream frames, as it would find only the newest on a real controller."""
+_DEAF_READER_BYTES = 1 << 20
+"""A client this far behind does not read its answers."""
 
 
 @dataclass
 class _Connection:
     socket: socket.socket
     port: int
-    session: RtdeSession
-    inbox: bytes = b""
+    channel: Channel
     outbox: bytes = b""
 
 
@@ -50,13 +58,27 @@ class _Server:
     version: tuple[int, int, int, int]
     program: ProgramRunner
     selector: selectors.BaseSelector = field(default_factory=selectors.DefaultSelector)
-    connections: list[_Connection] = field(default_factory=list)
+    connections: dict[socket.socket, _Connection] = field(default_factory=dict)
     owners: dict[str, RtdeSession] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.gripper = RobotiqSocket()
+        self.gripper = self.program.gripper
         self.dashboard = Dashboard(self.program, self.version)
         self.faults = Faults(self.dashboard, self.gripper)
+        self.interfaces = ClientInterfaces(self.program, self.version)
+        self.spare = os.open(os.devnull, os.O_RDONLY)
+
+    def channel(self, port: int) -> Channel:
+        """A conversation for a new client of a port."""
+        if port == RTDE_PORT:
+            return RtdeSession(self.program, self.version, self.owners)
+        if port == DASHBOARD_PORT:
+            return LineChannel(self.dashboard.reply, f"{GREETING}\n".encode())
+        if port == GRIPPER_PORT:
+            return LineChannel(self.gripper.answer)
+        if port == FAULT_PORT:
+            return LineChannel(lambda line: f"{self.faults.answer(line)}\n".encode())
+        return self.interfaces.channel(port)
 
     def listen(self) -> None:
         for port in (*SCRIPT_PORTS, DASHBOARD_PORT, RTDE_PORT, GRIPPER_PORT, FAULT_PORT):
@@ -65,71 +87,106 @@ class _Server:
             try:
                 listener.bind((self.host, port))
             except OSError as error:
+                listener.close()
                 raise InputError(
                     f"cannot listen on {self.host}:{port} ({error.strerror}): choose another 127.0.0.x"
                 ) from error
-            listener.listen(8)
+            listener.listen(_BACKLOG)
             listener.setblocking(False)
             self.selector.register(listener, selectors.EVENT_READ, partial(self.accept, listener))
 
     def run(self, go_on: Callable[[], bool]) -> None:
         due = time.monotonic()
         while go_on():
-            for key, _ in self.selector.select(max(0.0, due - time.monotonic())):
-                if isinstance(key.data, _Connection):
+            for key, events in self.selector.select(max(0.0, due - time.monotonic())):
+                if not isinstance(key.data, _Connection):
+                    key.data()
+                elif events & selectors.EVENT_READ:
                     self.read(key.data)
                 else:
-                    key.data()
+                    self.send(key.data, b"")
             now = time.monotonic()
             if now >= due:
                 due = now + CYCLE_S if now - due > _LATE_CYCLES * CYCLE_S else due + CYCLE_S
-                self.program.step()
-                self.gripper.step(self.program.arm.dt_s)
+                self.advance()
                 self.stream(now)
+
+    def advance(self) -> None:
+        try:
+            self.program.step()
+        except Exception as error:  # a fault of the simulation: it costs the program, and is on record
+            self.program.refuse(f"the simulation failed: {type(error).__name__}: {error}")
+            self.program.kill()
 
     def close(self) -> None:
         for key in list(self.selector.get_map().values()):
             if isinstance(key.fileobj, socket.socket):
                 key.fileobj.close()
         self.selector.close()
+        os.close(self.spare)
+        self.program.kill()
 
     def accept(self, listener: socket.socket) -> None:
-        client, _ = listener.accept()
+        try:
+            client, _ = listener.accept()
+        except OSError as error:
+            if error.errno in (errno.EMFILE, errno.ENFILE):
+                self.refuse_one(listener)
+            return
         port = listener.getsockname()[1]
         if port != FAULT_PORT and self.faults.link_is_down:
             client.close()
             return
         client.setblocking(False)
         client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        connection = _Connection(client, port, RtdeSession(self.owners, self.version))
-        self.connections.append(connection)
+        connection = _Connection(client, port, self.channel(port))
+        self.connections[client] = connection
         self.selector.register(client, selectors.EVENT_READ, connection)
-        if port == DASHBOARD_PORT:
-            self.send(connection, f"{GREETING}\n".encode())
+        self.send(connection, connection.channel.opened())
 
-    def drop(self, connection: _Connection) -> None:
-        if connection in self.connections:
-            self.connections.remove(connection)
+    def refuse_one(self, listener: socket.socket) -> None:
+        """No file descriptor is left: take the client with the one kept for this, and hang up."""
+        self.program.arm.note("a client was refused: too many connections")
+        os.close(self.spare)
+        try:
+            listener.accept()[0].close()
+        except OSError:  # it hung up by itself, which is as good
+            pass
+        finally:
+            self.spare = os.open(os.devnull, os.O_RDONLY)
+
+    def drop(self, connection: _Connection, why: str = "") -> None:
+        if self.connections.pop(connection.socket, None):
+            if why:
+                self.program.arm.note(f"port {connection.port}: {why}; connection closed")
             self.selector.unregister(connection.socket)
             connection.socket.close()
-            connection.session.close()
+            connection.channel.close()
 
     def send(self, connection: _Connection, data: bytes) -> None:
+        """Send what the socket takes, and the rest when it takes more."""
+        if connection.socket not in self.connections:
+            return
         connection.outbox += data
         try:
-            sent = connection.socket.send(connection.outbox)
+            sent = connection.socket.send(connection.outbox) if connection.outbox else 0
         except BlockingIOError:
-            return
+            sent = 0
         except OSError:
             self.drop(connection)
             return
         connection.outbox = connection.outbox[sent:]
+        if len(connection.outbox) > _DEAF_READER_BYTES:
+            self.drop(connection, "it does not read its answers")
+            return
+        waiting = selectors.EVENT_WRITE if connection.outbox else 0
+        self.selector.modify(connection.socket, selectors.EVENT_READ | waiting, connection)
 
     def read(self, connection: _Connection) -> None:
-        if connection not in self.connections:
+        if connection.socket not in self.connections:
             return
         try:
-            data = connection.socket.recv(65536)
+            data = connection.socket.recv(_READ_BYTES)
         except BlockingIOError:
             return
         except OSError:
@@ -137,47 +194,32 @@ class _Server:
         if not data:
             self.drop(connection)
             return
-        connection.inbox += data
-        if connection.port == RTDE_PORT:
-            replies, connection.inbox = connection.session.receive(connection.inbox, self.program)
-            self.send(connection, replies)
-        elif connection.port in SCRIPT_PORTS:
-            self.read_programs(connection)
-        else:
-            self.read_lines(connection)
-
-    def read_programs(self, connection: _Connection) -> None:
-        text = connection.inbox.decode(errors="replace")
-        while complete := re.match(r"\s*(?:def|sec) \w+\(.*?^end[ \t]*\r?\n", text, re.MULTILINE | re.DOTALL):
-            self.program.load(complete[0])
-            text = text[complete.end() :]
-        connection.inbox = text.encode()
-
-    def read_lines(self, connection: _Connection) -> None:
-        *lines, connection.inbox = connection.inbox.split(b"\n")
-        for line in (raw.decode(errors="replace") for raw in lines):
-            if connection.port == DASHBOARD_PORT:
-                self.send(connection, f"{self.dashboard.answer(line)}\n".encode())
-            elif connection.port == GRIPPER_PORT:
-                self.send(connection, self.gripper.answer(line))
-            else:
-                self.send(connection, f"{self.faults.answer(line)}\n".encode())
+        self.send(connection, self.said(connection, partial(connection.channel.receive, data)))
         if self.faults.link_is_down:
-            for other in [c for c in self.connections if c.port != FAULT_PORT]:
+            for other in [c for c in self.connections.values() if c.port != FAULT_PORT]:
                 self.drop(other)
 
+    def said(self, connection: _Connection, say: Callable[[], bytes]) -> bytes:
+        """What a channel has to say; its end or its fault ends its connection."""
+        try:
+            return say()
+        except Finished as end:
+            self.send(connection, end.last)
+            self.drop(connection)
+        except Refused as error:
+            self.drop(connection, str(error))
+        except Exception as error:  # a fault of the simulation: it costs this connection, and is on record
+            self.drop(connection, f"{type(error).__name__}: {error}")
+        return b""
+
     def stream(self, now: float) -> None:
-        listeners = [
-            c for c in self.connections if c.session.streaming and now >= c.session.next_s - CYCLE_S / 4
-        ]
-        if not listeners or self.faults.stream_frozen:
+        if self.faults.stream_frozen:
             return
-        values = output_values(self.program)
-        for connection in listeners:
-            session = connection.session
-            session.next_s = max(session.next_s + session.period_s, now)
+        for connection in list(self.connections.values()):
             if len(connection.outbox) < _SLOW_READER_BYTES:
-                self.send(connection, session.packet(values))
+                data = self.said(connection, partial(connection.channel.stream, now))
+                if data:
+                    self.send(connection, data)
 
 
 def serve(
@@ -206,11 +248,11 @@ def serve(
         raise InputError(
             f"the simulated controller serves loopback addresses only, not '{host}': use 127.0.0.2"
         )
-    if not time_scale > 0:
+    if not 0 < time_scale < float("inf"):
         raise InputError(f"the time scale must be positive, not {time_scale}")
-    program = ProgramRunner(SimulatedArm(arm_named(model)))
-    program.arm.dt_s = CYCLE_S * time_scale
-    server = _Server(host, version, program)
+    arm = SimulatedArm(arm_named(model))
+    arm.dt_s = CYCLE_S * time_scale
+    server = _Server(host, version, ProgramRunner(arm, RobotiqSocket(), host))
     try:
         server.listen()
         stopped: list[bool] = []

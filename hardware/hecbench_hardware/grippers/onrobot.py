@@ -26,6 +26,8 @@ _GRIP, _STOP = 1, 8
 _BUSY, _HOLDING, _SAFETY = 1 << 0, 1 << 1, 0b1111100
 _READ, _WRITE = 3, 16
 _POLL_S = 0.02
+_SHORTEST_BODY = 2
+"""Function code and exception."""
 
 
 @dataclass
@@ -88,7 +90,9 @@ class OnRobotGripper(Guarded):
 
     def _read(self, address: int, count: int) -> tuple[int, ...]:
         body = self._exchange(struct.pack(">BHH", _READ, address, count))
-        return struct.unpack(f">{count}H", body[2 : 2 + 2 * count])
+        if len(body) != 2 + 2 * count:
+            raise DeviceFault(Fault.GRIPPER, self.name, f"{len(body)} bytes instead of {count} registers")
+        return struct.unpack(f">{count}H", body[2:])
 
     def _write(self, address: int, values: list[int]) -> None:
         count = len(values)
@@ -101,7 +105,7 @@ class OnRobotGripper(Guarded):
         try:
             self._socket.sendall(header + request)
             length = struct.unpack(">HHHB", self._receive(7))[2]
-            body = self._receive(length - 1)
+            body = self._receive(max(length - 1, _SHORTEST_BODY))
         except OSError as error:
             raise DeviceFault(
                 Fault.GRIPPER, self.name, f"no answer ({error.strerror or 'time-out'})"

@@ -27,6 +27,9 @@ FORCE_N = (20.0, 235.0)
 """Grip forces of FOR 0 and 255."""
 _ACTIVE, _MOVING, _HOLDING = 3, 0, (1, 2)
 _POLL_S = 0.01
+_ACKNOWLEDGED = b"ack"
+"""The answer to SET, which has no newline."""
+_ANSWER_BYTES = 1024
 
 
 @dataclass
@@ -112,13 +115,20 @@ class RobotiqGripper(Guarded):
         return int(answer[1])
 
     def _command(self, line: str) -> None:
-        if self._exchange(line) != "ack":
+        if self._exchange(line) != _ACKNOWLEDGED.decode():
             raise DeviceFault(Fault.GRIPPER, self.name, f"'{line}' was not acknowledged")
 
     def _exchange(self, line: str) -> str:
+        """Send a line and return its whole answer, in however many pieces it comes: `ack`, or a line."""
+        answer = b""
         try:
             self._socket.sendall(f"{line}\n".encode())
-            return self._socket.recv(1024).decode(errors="replace").strip()
+            while answer != _ACKNOWLEDGED and not answer.endswith(b"\n") and len(answer) < _ANSWER_BYTES:
+                piece = self._socket.recv(_ANSWER_BYTES)
+                if not piece:
+                    raise ConnectionResetError(None, "connection closed")
+                answer += piece
+            return answer.decode(errors="replace").strip()
         except OSError as error:
             detail = f"no answer to '{line}' ({error.strerror or 'time-out'})"
             raise DeviceFault(Fault.GRIPPER, self.name, detail) from None

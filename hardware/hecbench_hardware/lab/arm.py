@@ -5,15 +5,18 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from hecbench.errors import InputError
 from hecbench.se3 import Array
-from hecbench_hardware import limits as bounds
+from hecbench_hardware.clearance import check_motion
 from hecbench_hardware.devices import GripperStatus, RobotState
 from hecbench_hardware.lab.cells import Station
+from hecbench_hardware.limits import Sphere
+from hecbench_hardware.motions import JointMotion, LineMotion, Motion, six_joints
 
 
 class LabRobot:
@@ -34,6 +37,10 @@ class LabRobot:
         """Take control."""
         self.enabled = True
 
+    def carry(self, balls: tuple[Sphere, ...]) -> None:
+        """Check every motion for these balls of the flange frame too."""
+        self.limits = replace(self.limits, tool=self.limits.tool + balls)
+
     def state(self) -> RobotState:
         """Where the arm was put."""
         base_T_flange = self.arm.forward(self._joints)
@@ -51,18 +58,17 @@ class LabRobot:
 
     def move_joints(self, joints_rad: Array, *, speed_rad_s: float | None = None) -> None:
         """To joints (6,) rad, after the limits were checked on the way."""
-        target = bounds.six_joints(joints_rad)
-        self._follow(bounds.joint_path(self._joints, target))
+        self._follow(JointMotion(self.arm, self._joints, six_joints(joints_rad)))
 
     def move_linear(self, base_T_flange: Array, *, speed_m_s: float | None = None) -> None:
         """Straight to a flange pose (4, 4), after the limits were checked on the way."""
-        self._follow(bounds.linear_path(self.arm, self._joints, base_T_flange))
+        self._follow(LineMotion(self.arm, self._joints, np.asarray(base_T_flange, float)))
 
-    def _follow(self, path: Array) -> None:
+    def _follow(self, motion: Motion) -> None:
         if not self.enabled:
             raise InputError(f"{self.name} is read-only: enable it first")
-        bounds.check_path(self.arm, path, self.limits)
-        self._joints = path[-1].copy()
+        check_motion(self.arm, motion, self.limits)
+        self._joints = motion.joints[-1].copy()
 
     def settle(self, timeout_s: float = 5.0) -> RobotState:
         """It always stands still."""

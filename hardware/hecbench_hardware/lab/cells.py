@@ -17,8 +17,8 @@ from hecbench.errors import InputError
 from hecbench.recording import CameraModel
 from hecbench.robots.model import RobotModel, load_robot
 from hecbench.se3 import Array
-from hecbench_hardware.kinematics import ARMS, JOINT_NAMES, UrArm
-from hecbench_hardware.lab.scene import FlangeTag, Surroundings
+from hecbench_hardware.kinematics import ARMS, JOINT_NAMES, Arm
+from hecbench_hardware.lab.scene import FlangeTag, Scene, Surroundings
 from hecbench_hardware.lab.urdf_arm import UrdfArm
 from hecbench_hardware.limits import Box, Limits, Sphere
 from hecbench_hardware.trials import solids
@@ -49,7 +49,7 @@ class Station:
     """
 
     name: str
-    arm: UrArm
+    arm: Arm
     model: str
     gripper: solids.Gripper
     base_T_room: Array
@@ -77,11 +77,6 @@ class Station:
         return self.model in ARMS and self.gripper.name == "robotiq_2f_85"
 
     @property
-    def surroundings(self) -> Surroundings:
-        """Table and background."""
-        return Surroundings(base_T_room=self.base_T_room)
-
-    @property
     def limits(self) -> Limits:
         """The lab's own: nothing real can break, but the flange stays above the table."""
         return Limits(
@@ -93,6 +88,22 @@ class Station:
             tool_acceleration_m_s2=5.0,
             workspace=Box((-1.3, -1.3, -0.1), (1.3, 1.3, 1.8)),
             tool=(Sphere((0.0, 0.0, 0.0), 0.05),),
+        )
+
+    def scene(
+        self, *, flange_tag: FlangeTag | None = None, workpiece: bool = False, peg: bool = False
+    ) -> Scene:
+        """The arm in the room, with its gripper, and what else is in it."""
+        return Scene(
+            self.robot,
+            joint_names=self.joint_names,
+            base_link=self.base_link,
+            flange_link=self.flange_link,
+            gripper=None if self.draws_gripper_meshes else self.gripper,
+            peg_of=self.gripper if peg else None,
+            flange_tag=flange_tag,
+            workpiece=workpiece,
+            surroundings=Surroundings(base_T_room=self.base_T_room),
         )
 
     def camera_pose(self, number: int) -> Array:

@@ -14,12 +14,11 @@ from hecbench.recording import CameraModel
 from hecbench.se3 import Array
 from hecbench.storage import trial_record
 from hecbench.storage.recording_io import encode_png
-from hecbench_hardware import limits as bounds
 from hecbench_hardware import tag_edges, tags
 from hecbench_hardware.lab import cells
 from hecbench_hardware.lab.cells import Station
 from hecbench_hardware.lab.eye import Eye, Sensor
-from hecbench_hardware.lab.scene import Scene
+from hecbench_hardware.motions import LineMotion
 from hecbench_hardware.trials import solids, tasks
 from hecbench_hardware.trials.cell import Calibration, believed_workpiece
 from hecbench_hardware.trials.solids import Box, Solid
@@ -96,22 +95,13 @@ def frames(
     inserts = task is Task.INSERTION
     wanted = believed @ tasks.workpiece_T_tool(task)
     above, end = reach(station.arm, station.home_rad, station.gripper, task, wanted)
-    down = bounds.linear_path(station.arm, above, end @ se3.inverse(station.gripper.flange_T_tool))
+    down = LineMotion(station.arm, above, end @ se3.inverse(station.gripper.flange_T_tool)).joints
     last = down[::-1] if inserts else down[-1:]
-    parts = bounds.joint_path(station.home_rad, above), down, last
+    parts = np.linspace(station.home_rad, above, _PART), down, last
     path = np.concatenate([part[np.linspace(0, len(part) - 1, _PART).astype(int)] for part in parts])
     closing = np.full(_PART, _ON_PEG_RAD) if inserts else np.linspace(0, _ON_BLOCK_RAD, _PART)
     fingers = np.concatenate([np.full(2 * _PART, _ON_PEG_RAD if inserts else 0.0), closing])
-    scene = Scene(
-        station.robot,
-        joint_names=station.joint_names,
-        base_link=station.base_link,
-        flange_link=station.flange_link,
-        gripper=None if station.draws_gripper_meshes else station.gripper,
-        peg_of=station.gripper if inserts else None,
-        workpiece=True,
-        surroundings=station.surroundings,
-    )
+    scene = station.scene(workpiece=True, peg=inserts)
     look_at = base_T_workpiece[:3, 3] + [0.0, 0.0, 0.16]
     base_T_camera = cells.looking_at(
         look_at + station.base_T_room[:3, :3] @ np.array([0.75, 0.55 if inserts else -0.55, 0.45]), look_at

@@ -11,11 +11,11 @@ from hecbench.errors import InputError
 from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
 from hecbench.se3 import Array
 from hecbench.targets import AprilTagTarget
-from hecbench_hardware import limits as bounds
 from hecbench_hardware import tag_edges, tags
+from hecbench_hardware.clearance import check_pose
 from hecbench_hardware.lab.cells import Station, camera_model, ur5e
 from hecbench_hardware.lab.eye import Eye, Sensor
-from hecbench_hardware.lab.scene import FlangeTag, Scene
+from hecbench_hardware.lab.scene import FlangeTag
 
 _TRIES = 4000
 _SENSOR = Sensor(supersample=2, noise=2.0)
@@ -58,7 +58,7 @@ def marker_recording(
         AprilTagTarget(carried.target.family, carried.target.id, how.tag_m), carried.flange_T_tag
     )
     base_T_camera = station.camera_pose(calibration)
-    eye = Eye(_scene(station, carried), how.camera, how.sensor, whole=False)
+    eye = Eye(station.scene(flange_tag=carried), how.camera, how.sensor, whole=False)
     joints, corners = [], []
     try:
         for candidate in tag_joints(station, calibration, carried, how, rng):
@@ -113,7 +113,7 @@ def with_pictures(
     assert recording.camera is not None
     assert recording.joints_rad is not None
     assert recording.truth_parent_T_camera is not None
-    eye = Eye(_scene(station, None), recording.camera, sensor)
+    eye = Eye(station.scene(), recording.camera, sensor)
     images, masks = [], []
     try:
         for joints in recording.joints_rad:
@@ -146,18 +146,6 @@ def described(
     )
 
 
-def _scene(station: Station, carried: FlangeTag | None) -> Scene:
-    return Scene(
-        station.robot,
-        joint_names=station.joint_names,
-        base_link=station.base_link,
-        flange_link=station.flange_link,
-        gripper=None if station.draws_gripper_meshes else station.gripper,
-        flange_tag=carried,
-        surroundings=station.surroundings,
-    )
-
-
 def tag_joints(
     station: Station, calibration: int, carried: FlangeTag, how: MarkerSet, rng: np.random.Generator
 ) -> list[Array]:
@@ -173,7 +161,7 @@ def tag_joints(
         wanted = se3.make(base_T_tag[:3, :3] @ se3.so3_exp(turn), base_T_tag[:3, 3] + shift)
         for joints in station.arm.inverse(wanted @ se3.inverse(carried.flange_T_tag), start)[:1]:
             try:
-                bounds.check_path(station.arm, joints[None], station.limits)
+                check_pose(station.arm, joints, station.limits)
             except InputError:
                 continue
             found.append(joints)

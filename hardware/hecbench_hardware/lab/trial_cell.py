@@ -13,7 +13,6 @@ from hecbench_hardware.devices import Gripper, Robot
 from hecbench_hardware.lab.arm import LabGripper
 from hecbench_hardware.lab.cells import Station
 from hecbench_hardware.lab.eye import Eye, Sensor
-from hecbench_hardware.lab.scene import Scene
 from hecbench_hardware.tag_edges import TagRefused
 from hecbench_hardware.trials import physics, solids, sweep
 from hecbench_hardware.trials.cell import Calibration, NotSeen, Stroke
@@ -22,16 +21,7 @@ from hecbench_hardware.trials.tasks import Task, Verdict
 
 def lab_camera(station: Station, model: CameraModel, sensor: Sensor, seed: int) -> LabCamera:
     """A camera that sees the workpiece and the arm."""
-    scene = Scene(
-        station.robot,
-        joint_names=station.joint_names,
-        base_link=station.base_link,
-        flange_link=station.flange_link,
-        gripper=None if station.draws_gripper_meshes else station.gripper,
-        workpiece=True,
-        surroundings=station.surroundings,
-    )
-    eye = Eye(scene, model, sensor, whole=False)
+    eye = Eye(station.scene(workpiece=True), model, sensor, whole=False)
     return LabCamera(eye, station.camera_pose(0), station.home_rad, seed)
 
 

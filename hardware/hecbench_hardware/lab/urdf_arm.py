@@ -15,7 +15,6 @@ from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.robots.model import Motion, RobotModel, load_robot
 from hecbench.se3 import Array
-from hecbench_hardware.kinematics import UrArm
 
 _ROUNDS = 60
 _CLOSE = 1e-8
@@ -25,12 +24,14 @@ _STARTS = 6
 
 
 @dataclass(frozen=True)
-class UrdfArm(UrArm):
-    """A chain of six revolute joints; the lengths of its base class are not used."""
+class UrdfArm:
+    """A chain of six revolute joints."""
 
-    model: RobotModel | None = None
-    base_link: str = ""
-    flange_link: str = ""
+    name: str
+    chain: RobotModel
+    """The joints and links."""
+    base_link: str
+    flange_link: str
 
     @classmethod
     def load(cls, name: str, urdf: str) -> UrdfArm:
@@ -43,25 +44,7 @@ class UrdfArm(UrArm):
         moving = [joint for joint in model.joints if joint.motion is Motion.REVOLUTE]
         if len(model.joint_names) != 6 or len(moving) != 6:
             raise InputError(f"{urdf}: the lab drives arms with six revolute joints, not {len(moving)}")
-        return cls(
-            name,
-            (0.0, 0.0),
-            (0.0,) * 4,
-            model=model,
-            base_link=moving[0].parent,
-            flange_link=moving[-1].child,
-        )
-
-    @property
-    def reach_m(self) -> float:
-        """Sum of the lengths between the joints."""
-        return float(sum(np.linalg.norm(joint.origin[:3, 3]) for joint in self.chain.joints))
-
-    @property
-    def chain(self) -> RobotModel:
-        """The joints and links."""
-        assert self.model is not None
-        return self.model
+        return cls(name, model, moving[0].parent, moving[-1].child)
 
     def link_frames(self, joints_rad: ArrayLike) -> Array:
         """base_T_link (..., 6, 4, 4) after each joint, the last is base_T_flange."""
@@ -71,6 +54,10 @@ class UrdfArm(UrArm):
             chain.link_index(joint.child) for joint in chain.joints if joint.name in chain.joint_names
         ]
         return np.asarray(poses[..., children, :, :])
+
+    def forward(self, joints_rad: ArrayLike) -> Array:
+        """base_T_flange (..., 4, 4) of joints (..., 6) rad."""
+        return np.asarray(self.link_frames(joints_rad)[..., 5, :, :])
 
     def inverse(self, base_T_flange: ArrayLike, near_rad: ArrayLike | None = None) -> Array:
         """Joint solutions (K, 6) rad, the one nearest to `near_rad` first; no row when none was found."""

@@ -12,9 +12,10 @@ from hecbench import files, se3
 from hecbench.errors import InputError
 from hecbench.recording import Recording
 from hecbench.se3 import Array
-from hecbench_hardware import limits as bounds
-from hecbench_hardware.kinematics import UrArm
+from hecbench_hardware.clearance import check_motion
+from hecbench_hardware.kinematics import Arm
 from hecbench_hardware.limits import Limits
+from hecbench_hardware.motions import JointMotion, motion_time_s
 
 _TIME_SCALE = 50.0
 _PATIENCE_S = 2.0
@@ -42,7 +43,7 @@ def planned_joints(plan: Recording) -> Array:
     return joints
 
 
-def check_plan(arm: UrArm, plan: Recording, start: Array, limits: Limits) -> list[PlannedPose]:
+def check_plan(arm: Arm, plan: Recording, start: Array, limits: Limits) -> list[PlannedPose]:
     """Check every motion of a plan from joints `start` (6,) rad on; nothing moves.
 
     Raises:
@@ -51,17 +52,17 @@ def check_plan(arm: UrArm, plan: Recording, start: Array, limits: Limits) -> lis
     steps, here = [], start
     for sample_id, there in zip(plan.sample_ids, planned_joints(plan), strict=True):
         try:
-            bounds.check_path(arm, bounds.joint_path(here, there), limits)
+            check_motion(arm, JointMotion(arm, here, there), limits)
         except InputError as error:
             raise InputError(f"{plan.name}: sample {sample_id}: {error}") from None
         length = float(np.abs(there - here).max())
-        expected_s = bounds.motion_time_s(length, limits.joint_speed_rad_s, limits.joint_acceleration_rad_s2)
+        expected_s = motion_time_s(length, limits.joint_speed_rad_s, limits.joint_acceleration_rad_s2)
         steps.append(PlannedPose(sample_id, there.tolist(), arm.forward(there).tolist(), expected_s))
         here = there
     return steps
 
 
-def dry_run(arm: UrArm, plan: Recording, start: Array, limits: Limits) -> list[PlannedPose]:
+def dry_run(arm: Arm, plan: Recording, start: Array, limits: Limits) -> list[PlannedPose]:
     """Check a plan and drive it on a simulated controller of its own; nothing else gets a byte.
 
     Raises:

@@ -16,9 +16,10 @@ from hecbench import next_view, se3
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel, Mounting, Recording
 from hecbench.se3 import Array
-from hecbench_hardware import limits as bounds
-from hecbench_hardware.kinematics import UrArm
+from hecbench_hardware.clearance import check_motion, check_pose
+from hecbench_hardware.kinematics import Arm
 from hecbench_hardware.limits import Limits
+from hecbench_hardware.motions import JointMotion, six_joints
 
 _CANDIDATES = 3000
 _METRES_PER_RADIAN = 0.5
@@ -54,7 +55,7 @@ class View:
 
 def diverse_plan(
     cell: Recording,
-    arm: UrArm,
+    arm: Arm,
     limits: Limits,
     count: int,
     rng: np.random.Generator,
@@ -97,7 +98,7 @@ def diverse_plan(
 
 def informative_plan(
     cell: Recording,
-    arm: UrArm,
+    arm: Arm,
     limits: Limits,
     count: int,
     rng: np.random.Generator,
@@ -133,7 +134,7 @@ def informative_plan(
             )
     assert cell.joints_rad is not None
     assert cell.initial_parent_T_camera is not None
-    view, start = next_view.RobotView(cell), bounds.six_joints(cell.joints_rad[0])
+    view, start = next_view.RobotView(cell), six_joints(cell.joints_rad[0])
     drawn = start + rng.uniform(-1, 1, (_LOOKS, 6)) * _WANDER_RAD
     free = [joints for joints in drawn if _free_path(arm, start, joints, limits)]
     if len(free) < count:
@@ -151,7 +152,7 @@ def informative_plan(
     return _toured(cell, np.vstack([start, chosen.joints_rad]), arm, limits, count)
 
 
-def _toured(cell: Recording, chosen: Array, arm: UrArm, limits: Limits, count: int) -> Recording:
+def _toured(cell: Recording, chosen: Array, arm: Arm, limits: Limits, count: int) -> Recording:
     """The cell with these joints (N, 6) as its samples, in driving order."""
     ordered = _short_tour(chosen, arm, limits)
     if len(ordered) < count:
@@ -173,7 +174,7 @@ def _toured(cell: Recording, chosen: Array, arm: UrArm, limits: Limits, count: i
     )
 
 
-def _seed(cell: Recording, arm: UrArm) -> tuple[Array, Array, Array, Array]:
+def _seed(cell: Recording, arm: Arm) -> tuple[Array, Array, Array, Array]:
     """camera_T_target, parent_T_camera, carrier_T_target (4, 4) and joints (6,) of the first sample."""
     needed = {
         "camera.K": cell.camera and cell.camera.K,
@@ -188,7 +189,7 @@ def _seed(cell: Recording, arm: UrArm) -> tuple[Array, Array, Array, Array]:
     assert cell.joints_rad is not None
     assert cell.camera_T_target is not None
     assert cell.initial_parent_T_camera is not None
-    start, seen = bounds.six_joints(cell.joints_rad[0]), cell.camera_T_target[0]
+    start, seen = six_joints(cell.joints_rad[0]), cell.camera_T_target[0]
     base_T_flange = arm.forward(start)
     hand = base_T_flange if cell.mounting is Mounting.EYE_TO_HAND else se3.inverse(base_T_flange)
     return seen, cell.initial_parent_T_camera, se3.inverse(hand) @ cell.initial_parent_T_camera @ seen, start
@@ -227,13 +228,13 @@ def _in_view(camera_T_target: Array, camera: CameraModel, points_m: Array) -> Ar
     return np.asarray(inside.all(axis=(1, 2)))
 
 
-def _reachable(base_T_flange: Array, arm: UrArm, start: Array, limits: Limits) -> Array:
+def _reachable(base_T_flange: Array, arm: Arm, start: Array, limits: Limits) -> Array:
     """The joints (M, 6) nearest to the start of every pose that has some within the limits."""
     found = []
     for pose in base_T_flange:
         for joints in arm.inverse(pose, start)[:2]:
             try:
-                bounds.check_path(arm, joints[None], limits)
+                check_pose(arm, joints, limits)
             except InputError:
                 continue
             found.append(joints)
@@ -258,7 +259,7 @@ def _apart(poses: Array, other: Array) -> Array:
     return np.asarray(np.hypot(turn, shift / _METRES_PER_RADIAN))
 
 
-def _short_tour(joints: Array, arm: UrArm, limits: Limits) -> Array:
+def _short_tour(joints: Array, arm: Arm, limits: Limits) -> Array:
     """The same joints (N, 6), each followed by the nearest one left that it can move to freely."""
     tour, left = [joints[0]], list(joints[1:])
     while left:
@@ -272,9 +273,9 @@ def _short_tour(joints: Array, arm: UrArm, limits: Limits) -> Array:
     return np.array(tour)
 
 
-def _free_path(arm: UrArm, start: Array, end: Array, limits: Limits) -> bool:
+def _free_path(arm: Arm, start: Array, end: Array, limits: Limits) -> bool:
     try:
-        bounds.check_path(arm, bounds.joint_path(start, end), limits)
+        check_motion(arm, JointMotion(arm, start, end), limits)
     except InputError:
         return False
     return True

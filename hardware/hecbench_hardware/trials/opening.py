@@ -105,9 +105,10 @@ def _real_cell(options: TrialOptions, opened: ExitStack) -> Opened:
     host = options.host_option if takes_host else {}
     gripper = open_device(Kind.GRIPPER, options.gripper, host | settings["gripper"])
     opened.callback(gripper.close)
+    shape = solids.GRIPPERS["robotiq_2f_85" if "robotiq" in options.gripper else "rg2"]
+    robot.carry(shape.envelope())
     operator = Operator(robot, options.yes)
     what = "trials from where it stands, which becomes its home"
     take_control(robot, what, armed=options.arm, confirm=operator.confirm, gripper=gripper)
-    shape = solids.GRIPPERS["robotiq_2f_85" if "robotiq" in options.gripper else "rg2"]
     cell = RealCell(robot, gripper, camera, model, shape, places=options.places, ask=operator.ask)
     return Opened(cell, found, notes, operator)

@@ -13,6 +13,7 @@ import numpy as np
 from hecbench import se3
 from hecbench.se3 import Array
 from hecbench.targets import AprilTagTarget
+from hecbench_hardware.limits import Sphere
 
 Vector = tuple[float, float, float]
 
@@ -77,6 +78,19 @@ class Gripper:
             Box("left finger", (-x, 0.0, z), half),
             Box("right finger", (x, 0.0, z), half),
         )
+
+    def envelope(self) -> tuple[Sphere, ...]:
+        """Balls that together cover palm and open fingers, in the flange frame; what the fingers hold is not in it."""
+        balls = []
+        for solid in self.solids():
+            assert isinstance(solid, Box)
+            cells = np.ceil(2 * np.array(solid.half_m) / min(solid.half_m)).astype(int)
+            half = np.array(solid.half_m) / cells
+            for index in np.ndindex(*cells):
+                centre = np.array(solid.centre_m) - solid.half_m + (2 * np.array(index) + 1) * half
+                in_flange = _vector(centre + self.flange_T_tool[:3, 3])
+                balls.append(Sphere(in_flange, float(np.linalg.norm(half))))
+        return tuple(balls)
 
 
 GRIPPERS = {

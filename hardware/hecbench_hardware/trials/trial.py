@@ -15,7 +15,7 @@ from hecbench.errors import InputError
 from hecbench.se3 import Array
 from hecbench.storage.trial_record import Outcome, TrialRecord
 from hecbench_hardware.devices import DeviceFault, Fault
-from hecbench_hardware.kinematics import UrArm
+from hecbench_hardware.kinematics import Arm
 from hecbench_hardware.trials import solids, tasks
 from hecbench_hardware.trials.cell import Calibration, NotSeen, Stroke, TrialCell, believed_workpiece
 from hecbench_hardware.trials.tasks import Task
@@ -190,7 +190,7 @@ class Trial:
         return None
 
 
-def reach(arm: UrArm, home_rad: Array, shape: solids.Gripper, task: Task, end: Array) -> tuple[Array, Array]:
+def reach(arm: Arm, home_rad: Array, shape: solids.Gripper, task: Task, end: Array) -> tuple[Array, Array]:
     """Joints (6,) rad at the start of the stroke to `end`, and the end pose turned the way that is nearest to home.
 
     Raises:

@@ -29,13 +29,13 @@ class Dashboard:
                     lines.readline()
                     lines.write(f"{command}\n")
                     lines.flush()
-                    answer = lines.readline().strip()
+                    answer = lines.readline()
         except OSError as error:
             detail = f"the dashboard does not answer ({error.strerror or 'time-out'})"
             raise DeviceFault(Fault.LINK_LOST, f"robot {self.host}", detail) from None
-        if not answer:
+        if not answer.endswith("\n"):
             raise DeviceFault(Fault.LINK_LOST, f"robot {self.host}", f"no answer to '{command}'")
-        return answer
+        return answer.strip()
 
     def is_simulated(self) -> bool:
         """Whether this is our simulated controller."""

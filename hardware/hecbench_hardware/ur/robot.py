@@ -6,7 +6,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any, Self
 
 import numpy as np
@@ -14,10 +14,11 @@ import numpy as np
 from hecbench import se3
 from hecbench.errors import HecbenchError, InputError
 from hecbench.se3 import Array
-from hecbench_hardware import limits as bounds
+from hecbench_hardware.clearance import check_motion, tool_line
 from hecbench_hardware.devices import DeviceFault, Fault, RobotState
-from hecbench_hardware.kinematics import UrArm
-from hecbench_hardware.limits import Limits
+from hecbench_hardware.kinematics import Arm
+from hecbench_hardware.limits import Limits, Sphere, refuse_too_fast
+from hecbench_hardware.motions import JointMotion, LineMotion, motion_time_s, six_joints
 from hecbench_hardware.ur import recovery
 from hecbench_hardware.ur.dashboard import Dashboard, probe
 from hecbench_hardware.ur.outputs import Outputs
@@ -29,6 +30,8 @@ POLL_S = 0.001
 STILL_RAD_S = 1e-3
 STILL_FOR_S = 0.3
 _ARRIVED_RAD = 1e-3
+_GAP_M = 0.02
+"""More than factory calibration explains: the tool centre point was changed since."""
 _BRAKE_S = 0.6
 """Braking from the highest speed, and some."""
 _NEWS_S = 0.2
@@ -41,7 +44,7 @@ class UrRobot:
     def __init__(
         self,
         host: str,
-        arm: UrArm,
+        arm: Arm,
         *,
         limits: Limits | None = None,
         supervision: Supervision | None = None,
@@ -62,13 +65,17 @@ class UrRobot:
         """
         self.name = f"robot {host}"
         self.host, self.arm = host, arm
-        self.limits, self.supervision = limits or Limits(), supervision or Supervision()
+        self.supervision = supervision or Supervision()
         self.flange_T_tcp: Array | None = None
         """Tool centre point that is set on the controller; known once enabled."""
         probe(host)
         self._dashboard = Dashboard(host)
         self.simulated = self._dashboard.is_simulated()
+        if not self.simulated:
+            self.supervision.refuse_blind()
         self._refuse_other_model()
+        self._carried: tuple[Sphere, ...] = ()
+        self.limits = limits or Limits()
         self._control: Worker | None = None
         self._speed_slider = speed_slider
         self._slider_before: float | None = None
@@ -81,6 +88,29 @@ class UrRobot:
         answer = self._dashboard.ask("get robot model").upper()
         if answer.rstrip("E") != self.arm.name.upper().rstrip("E"):
             raise InputError(f"{self.name} is a {answer}, not a {self.arm.name}: choose the right --robot")
+
+    @property
+    def limits(self) -> Limits:
+        """Bounds of every motion, with everything that the flange carries: at least a rod to the tool centre point."""
+        tool = self._limits.tool + self._carried + tool_line(self._flange_T_tcp())
+        return replace(self._limits, tool=tool)
+
+    @limits.setter
+    def limits(self, limits: Limits) -> None:
+        if not self.simulated:
+            refuse_too_fast(limits)
+        self._limits = limits
+
+    def carry(self, balls: tuple[Sphere, ...]) -> None:
+        """Check every motion for these balls of the flange frame too, a gripper's."""
+        self._carried = balls
+
+    def _flange_T_tcp(self) -> Array:
+        """(4, 4), from the state until control was taken."""
+        if self.flange_T_tcp is not None:
+            return self.flange_T_tcp
+        sample = self._stream.latest
+        return np.asarray(se3.inverse(self.arm.forward(sample.joints)) @ sample.base_T_tcp)
 
     # reading
 
@@ -194,12 +224,12 @@ class UrRobot:
             InputError: The target or the path leaves the limits, or the arm is read-only.
             DeviceFault: It did not arrive, and why.
         """
-        target = bounds.six_joints(joints_rad)
-        speed = _speed(speed_rad_s, self.limits.joint_speed_rad_s, "rad/s")
-        start = self._ready_joints()
-        bounds.check_path(self.arm, bounds.joint_path(start, target), self.limits)
-        acceleration = self.limits.joint_acceleration_rad_s2
-        expected_s = bounds.motion_time_s(float(np.abs(target - start).max()), speed, acceleration)
+        target, limits = six_joints(joints_rad), self.limits
+        speed = _speed(speed_rad_s, limits.joint_speed_rad_s, "rad/s")
+        start, gap_m = self._ready()
+        check_motion(self.arm, JointMotion(self.arm, start, target), limits, gap_m)
+        acceleration = limits.joint_acceleration_rad_s2
+        expected_s = motion_time_s(float(np.abs(target - start).max()), speed, acceleration)
         self._move("moveJ", target.tolist(), speed, acceleration, expected_s)
         self._target = target
 
@@ -208,29 +238,36 @@ class UrRobot:
 
         Raises as `move_joints` does.
         """
-        speed = _speed(speed_m_s, self.limits.tool_speed_m_s, "m/s")
-        start = self._ready_joints()
-        path = bounds.linear_path(self.arm, start, np.asarray(base_T_flange, float))
-        bounds.check_path(self.arm, path, self.limits)
-        assert self.flange_T_tcp is not None
-        base_T_tcp = base_T_flange @ self.flange_T_tcp
-        vector = [*base_T_tcp[:3, 3].tolist(), *se3.so3_log(base_T_tcp[:3, :3]).tolist()]
-        acceleration = self.limits.tool_acceleration_m_s2
-        length = float(np.linalg.norm(base_T_tcp[:3, 3] - self._stream.latest.tcp_vector[:3]))
-        turn = float(np.abs(np.diff(path, axis=0)).sum(axis=0).max())
-        speed = min(speed, bounds.line_speed_m_s(path, length, self.limits.joint_speed_rad_s))
-        expected_s = bounds.motion_time_s(length, speed, acceleration) + bounds.motion_time_s(
-            turn, self.limits.joint_speed_rad_s, self.limits.joint_acceleration_rad_s2
+        limits = self.limits
+        speed = _speed(speed_m_s, limits.tool_speed_m_s, "m/s")
+        start, gap_m = self._ready()
+        line = LineMotion(self.arm, start, np.asarray(base_T_flange, float), self._flange_T_tcp())
+        check_motion(self.arm, line, limits, gap_m)
+        vector = [*line.base_T_tcp[:3, 3].tolist(), *se3.so3_log(line.base_T_tcp[:3, :3]).tolist()]
+        acceleration, length = limits.tool_acceleration_m_s2, float(np.linalg.norm(line.shift_m))
+        turn = float(np.abs(np.diff(line.joints, axis=0)).sum(axis=0).max())
+        speed = min(speed, line.speed_m_s(limits.joint_speed_rad_s))
+        expected_s = motion_time_s(length, speed, acceleration) + motion_time_s(
+            turn, limits.joint_speed_rad_s, limits.joint_acceleration_rad_s2
         )
         self._move("moveL", vector, speed, acceleration, expected_s)
         self._target = None
 
-    def _ready_joints(self) -> Array:
+    def _ready(self) -> tuple[Array, float]:
+        """The joints (6,) rad from which a motion begins; how far apart the controller's tool and ours are there, m."""
         if self._stream.fault:
             raise self._stream.fault
         if self._control is None:
             raise InputError(f"{self.name} is read-only: add --arm to let it move")
-        return self._stream.latest.joints
+        sample = self._stream.latest
+        ours = self.arm.forward(sample.joints) @ self._flange_T_tcp()
+        gap_m = float(se3.translation_error_m(sample.base_T_tcp, ours))
+        if gap_m > _GAP_M:
+            raise InputError(
+                f"{self.name}: the tool centre point is {gap_m:.3f} m from where it was set when control was taken:"
+                " set it back on the pendant, or start again"
+            )
+        return sample.joints, gap_m
 
     def _move(
         self, name: str, target: list[float], speed: float, acceleration: float, expected_s: float
@@ -318,7 +355,7 @@ class UrRobot:
     @contextmanager
     def freedrive(self) -> Iterator[None]:
         """The arm can be guided by hand inside the block."""
-        self._ready_joints()
+        self._ready()
         self._target = None
         if not self._request("call", "freedriveMode"):
             raise self._why_program_ended()

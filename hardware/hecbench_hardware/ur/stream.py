@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hecbench import se3
-from hecbench.errors import HecbenchError
+from hecbench.errors import HecbenchError, InputError
 from hecbench.se3 import Array
 from hecbench_hardware.devices import DeviceFault, Fault
 from hecbench_hardware.ur.process import Worker, WorkerGone
@@ -31,6 +31,10 @@ _SAFETY = {
 _LINK = (Fault.LINK_LOST, Fault.STALE)
 
 
+MOST_AGE_S, MOST_FORCE_N = 1.0, 150.0
+"""A real arm at its top speed covers half a metre in so long; above this force its controller stops by itself."""
+
+
 @dataclass(frozen=True)
 class Supervision:
     """When the supervisor stops the arm, and how long a motion may take."""
@@ -41,6 +45,20 @@ class Supervision:
     """Norm of the tool force."""
     late_s: float = 1.0
     """Past its expected time a motion counts as late."""
+
+    def __post_init__(self) -> None:
+        """Refuse what would stop the arm always."""
+        for name in ("max_age_s", "max_force_n", "late_s"):
+            if not getattr(self, name) > 0:
+                raise InputError(f"{name}={getattr(self, name)} must be above 0")
+
+    def refuse_blind(self) -> None:
+        """Raise an `InputError` for what a real arm may not be driven with."""
+        for name, most in (("max_age_s", MOST_AGE_S), ("max_force_n", MOST_FORCE_N)):
+            if getattr(self, name) > most:
+                raise InputError(
+                    f"{name}={getattr(self, name)} is above the most allowed for a real arm, {most}"
+                )
 
 
 @dataclass(frozen=True)

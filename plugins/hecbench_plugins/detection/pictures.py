@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import threads
+from hecbench import apriltags, threads
 from hecbench.cache import Cache
 from hecbench.recording import Recording
 
@@ -22,6 +22,7 @@ Grey = NDArray[np.uint8]
 Result = TypeVar("Result")
 
 _KEPT = Cache("detections.sqlite", most_bytes=64 * 2**20)
+_LIBRARIES = ("opencv-contrib-python-headless", "pupil-apriltags")
 _ARRAY = 1
 """Code of an array among MessagePack's extension types."""
 
@@ -79,12 +80,12 @@ def each(
 
 @cache
 def _program() -> bytes:
-    """A digest of all that decides what is found: this package's source and the libraries' versions."""
+    """A digest of all that decides what is found: the detectors' source and the libraries' versions."""
     digest = hashlib.sha256()
-    for path in sorted(Path(__file__).parent.glob("*.py")):
+    for path in [Path(apriltags.__file__), *sorted(Path(__file__).parent.glob("*.py"))]:
         digest.update(path.read_bytes())
-    for name in ("opencv-contrib-python-headless", "pupil-apriltags"):
-        digest.update(metadata.version(name).encode())
+    for name in _LIBRARIES:
+        digest.update(repr([found.version for found in metadata.distributions(name=name)]).encode())
     return digest.digest()
 
 

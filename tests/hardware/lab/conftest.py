@@ -25,17 +25,7 @@ def drawable():
 @pytest.fixture(scope="session")
 def lab_scene(station):
     pytest.importorskip("mujoco", reason="the lab needs mujoco: pip install 'hecbench[lab]'")
-    from hecbench_hardware.lab.scene import Scene
-
-    return Scene(
-        station.robot,
-        joint_names=station.joint_names,
-        base_link=station.base_link,
-        flange_link=station.flange_link,
-        flange_tag=station.flange_tag(0),
-        workpiece=True,
-        surroundings=station.surroundings,
-    )
+    return station.scene(flange_tag=station.flange_tag(0), workpiece=True)
 
 
 @pytest.fixture

@@ -112,14 +112,7 @@ def test_every_calibration_shows_tag_and_workpiece_in_front(station):
 def test_numerical_kinematics_agree_with_the_closed_form(station, rng):
     from hecbench.robots.model import load_robot
 
-    arm = UrdfArm(
-        "ur5e",
-        (0.0, 0.0),
-        (0.0,) * 4,
-        model=load_robot("ur5e", meshes=False),
-        base_link="base",
-        flange_link="tool0",
-    )
+    arm = UrdfArm("ur5e", load_robot("ur5e", meshes=False), "base", "tool0")
     near = station.configuration_rad(0)
     for _ in range(5):
         joints = near + rng.uniform(-0.3, 0.3, 6)

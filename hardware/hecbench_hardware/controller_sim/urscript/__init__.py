@@ -1,0 +1,1 @@
+"""An interpreter of URScript, as far as the simulated controller executes it."""
