@@ -114,11 +114,15 @@ class SolverSpec(ConfigurableSpec):
 
 @dataclass(frozen=True, kw_only=True)
 class DatasetSpec(Spec):
-    """A reader of one format. `sniff(path)` is quick and never raises; `load(path)` decodes no image."""
+    """A reader of one format. `sniff(path)` is quick and never raises; `load(path)` decodes no image.
+
+    A `last_resort` is asked when no other format recognises the path; it may decode images to prove a convention.
+    """
 
     kind: ClassVar[Kind] = Kind.DATASET
     sniff: Callable[[Path], bool]
     load: Callable[[Path], Recording]
+    last_resort: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
