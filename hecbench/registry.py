@@ -23,6 +23,9 @@ from hecbench import hookspecs
 from hecbench.errors import InputError
 from hecbench.specs import AnySpec, ConfigurableSpec, Kind, SolverSpec, Spec
 
+_WITH_OPTIONS = (Kind.SOLVER, Kind.SEGMENTER, Kind.TRANSLATOR)
+"""Kinds whose specs are `ConfigurableSpec`."""
+
 hookimpl = pluggy.HookimplMarker(hookspecs.GROUP)
 
 OWN_DISTRIBUTION = "hecbench"
@@ -93,7 +96,7 @@ class Registry:
 
     def is_foreign(self, solver: str) -> bool:
         """Whether the solver of that name, options set in it or not, comes from another distribution than ours."""
-        plain, _ = _settings(solver)
+        plain, _ = _settings(Kind.SOLVER, solver)
         return any(
             plugin.kind is Kind.SOLVER and plugin.name == plain and plugin.distribution != OWN_DISTRIBUTION
             for plugin in self.plugins
@@ -104,7 +107,7 @@ class Registry:
 
         The name of a solver, segmenter or translator may set options of it: ``name[option=value,...]``.
         """
-        plain, settings = _settings(kind, name) if issubclass(spec_type, ConfigurableSpec) else (name, {})
+        plain, settings = _settings(kind, name) if kind in _WITH_OPTIONS else (name, {})
         found = [plugin for plugin in self.select(kind) if plugin.name == plain]
         if not found:
             names = ", ".join(spec.name for spec in self.ready(kind, spec_type)) or "none"
