@@ -19,7 +19,7 @@ from hecbench.errors import InputError, Refusal
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Need, Option, SegmenterSpec
-from hecbench_plugins.views.silhouettes import Silhouettes, Uncertainty
+from hecbench_plugins.views.uncertainty import Uncertainty
 
 Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
@@ -65,6 +65,8 @@ class SegmentAnything:
             raise InputError("segmenter 'sam': give both graphs, sam[encoder=FILE.onnx,decoder=FILE.onnx]")
         if missing := _NEEDS - recording.offers():
             raise Refusal(f"{recording.name}: sam needs {', '.join(sorted(missing))}")
+        from hecbench_plugins.views.silhouettes import Silhouettes
+
         encoder, decoder = _session(Path(self.encoder)), _session(Path(self.decoder), _DECODER_INPUTS)
         silhouettes = Silhouettes(recording)
         assert recording.initial_parent_T_camera is not None
