@@ -95,6 +95,14 @@ def project(camera: CameraModel, points_c: Array) -> Array:
     return np.asarray(distort(ideal, camera) @ camera.K[:2, :2].T + camera.K[:2, 2])
 
 
+def same(camera: CameraModel, other: CameraModel) -> bool:
+    """Whether both put every point on the same pixel."""
+    if camera.K is None or other.K is None:
+        return camera.K is other.K
+    models = camera.distortion_model == other.distortion_model
+    return models and np.array_equal(parameters_of(camera), parameters_of(other))
+
+
 def parameters_of(camera: CameraModel) -> Array:
     """[fx, fy, cx, cy, distortion...] of a camera whose K is known."""
     assert camera.K is not None
