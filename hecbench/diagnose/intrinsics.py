@@ -40,7 +40,7 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
         return Finding(ID, Severity.CRITICAL, summary, _BY_SIZE, ratio, 1.0), _cured(case, camera, ratio)
     if camera.K is None or case.fitted_intrinsics:
         return Finding(ID, Severity.INFO, "no intrinsics are given", "calibrate them from the images"), case
-    offset = float(np.abs(camera.K[:2, 2] / [camera.width, camera.height] - 0.5).max())
+    offset = _off_centre(camera)
     outside = _outside(case.recording)
     fit = case.fit
     suspicious = (
@@ -97,6 +97,12 @@ def _outside(recording: Recording) -> int:
     return int(beyond.any(-1).sum())
 
 
+def _off_centre(camera: CameraModel) -> float:
+    """How far the principal point is from the image's centre, over the image's size."""
+    assert camera.K is not None
+    return float(np.abs(camera.K[:2, 2] / [camera.width, camera.height] - 0.5).max())
+
+
 def _scaled(camera: CameraModel, ratio: float) -> CameraModel:
     assert camera.K is not None
     K = camera.K.copy()
@@ -114,6 +120,8 @@ def _rescaled_fits(case: Examination, camera: CameraModel) -> Iterator[tuple[flo
     """Typical residual (rad) and the fit for every ratio that can be fitted."""
     for ratio in _RATIOS:
         scaled = _scaled(camera, ratio)
+        if _off_centre(scaled) > OFF_CENTRE:
+            continue
         other = replace(case, recording=replace(case.recording, camera=scaled))
         if other.fit is not None:
             assert scaled.K is not None

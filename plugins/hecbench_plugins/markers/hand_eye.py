@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
+from hecbench.agreement import contradiction
 from hecbench.errors import Refusal, SolverFailure
 from hecbench.estimate import Estimate
 from hecbench.recording import Recording
@@ -142,7 +143,7 @@ def answer(
 
     Raises:
         Refusal: the answer is no rigid transform.
-        SolverFailure: it leaves as much rotation unexplained as the hand made.
+        SolverFailure: it contradicts the samples.
     """
     if not se3.is_transform(parent_T_camera):
         raise Refusal(
@@ -152,12 +153,8 @@ def answer(
     if carrier_T_target is None:
         carrier_T_target = se3.mean(carrier_T_targets)
     spread_deg = rotation_spread_deg(carrier_T_targets[:, :3, :3])
-    hand_deg = rotation_spread_deg(pairs.hand[:, :3, :3])
-    if spread_deg >= hand_deg:
-        raise SolverFailure(
-            f"the target still turns by {spread_deg:.3g} deg rms where the hand turned by {hand_deg:.3g}: "
-            "are the robot poses inverted, or the mounting wrong?"
-        )
+    if reason := contradiction(pairs.hand, pairs.camera_T_target, parent_T_camera, carrier_T_target):
+        raise SolverFailure(reason)
     offsets = carrier_T_targets[:, :3, 3] - carrier_T_targets[:, :3, 3].mean(0)
     evidence = {
         "samples": len(pairs),

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
+from hecbench.agreement import LARGEST_SHARE, share_left
 from hecbench.bundle.adjustment import Solution, adjust
 from hecbench.bundle.model import Noise, Problem, State, linearise, start
 from hecbench.errors import Refusal, SolverFailure
@@ -24,8 +25,6 @@ Array = NDArray[np.float64]
 DEFAULT_NOISE = Noise(0.3, float(np.deg2rad(0.05)), 5e-4)
 """A corner, and a good arm: px, rad, m."""
 _STARTS = 2
-_EXPLAINS = 0.2
-"""Of the target's motion in the image that may remain; good data leave a few per cent."""
 _MOST_VOTES = 400
 """Poses compared each with each."""
 _AGREEING_RAD = np.deg2rad(8.0)
@@ -73,12 +72,12 @@ def adjust_with_exact_robot(recording: Recording, problem: Problem) -> Solution:
         raise Refusal("neither single3d nor shah gives a start on this recording")
     found = [adjust(problem, state, noise) for state in starts[:_STARTS]]
     best = min(found, key=lambda solution: solution.at.cost)
-    left_px = float(np.median(np.linalg.norm(best.at.residuals[problem.seen], axis=1)))
     centres_px = np.nanmean(problem.observed, axis=1)
-    moved_px = float(np.median(np.linalg.norm(centres_px - np.median(centres_px, axis=0), axis=1)))
-    if left_px > _EXPLAINS * moved_px:
+    left_px = np.linalg.norm(best.at.residuals[problem.seen], axis=1)
+    moved_px = np.linalg.norm(centres_px - np.median(centres_px, axis=0), axis=1)
+    if share_left(left_px, moved_px) > LARGEST_SHARE:
         raise SolverFailure(
-            f"leaves {left_px:.3g} px in the median where the target moved by {moved_px:.3g}: "
+            f"leaves {np.median(left_px):.3g} px in the median where the target moved by {np.median(moved_px):.3g}: "
             "are the robot poses inverted, or the mounting wrong?"
         )
     return best

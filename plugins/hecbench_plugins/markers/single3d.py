@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
+from hecbench.agreement import LARGEST_SHARE, percent, share_left
 from hecbench.errors import Refusal, SolverFailure
 from hecbench.estimate import Estimate, Termination
 from hecbench.recording import Recording
@@ -177,14 +178,15 @@ def answer(
     """The estimate with its evidence: the rms distance left, and how far from coplanar the positions are.
 
     Raises:
-        SolverFailure: the distance left is as large as the marker's own motion.
+        SolverFailure: it contradicts the samples.
     """
     parent_T_camera, marker = positions.rest_given(rotation)
-    left_m = _rms(positions.residuals_m(parent_T_camera, marker))
-    moved_m = _rms(positions.points_c - positions.points_c.mean(0))
-    if left_m >= moved_m:
+    residuals_m = positions.residuals_m(parent_T_camera, marker)
+    left_m = _rms(residuals_m)
+    moved_m = np.linalg.norm(positions.points_c - positions.points_c.mean(0), axis=1)
+    if (share := share_left(np.linalg.norm(residuals_m, axis=1), moved_m)) > LARGEST_SHARE:
         raise SolverFailure(
-            f"leaves {1e3 * left_m:.3g} mm rms where the marker moved by {1e3 * moved_m:.3g}: "
+            f"leaves the typical marker {percent(share)} of its own motion away from where it was seen: "
             "are the robot poses inverted, or the mounting wrong?"
         )
     condition = float(np.linalg.cond(positions.eliminated.A))
