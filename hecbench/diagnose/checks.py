@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from hecbench.diagnose import (
+    camera_frame,
     conditioning,
     consistency,
     coverage,
@@ -22,7 +23,9 @@ from hecbench.diagnose import (
     picture_residual,
     planar_ambiguity,
     pose_direction_or_mounting,
+    repeats,
     rotation_diversity,
+    rotation_reading,
     sample_moving,
     target_scale,
     units,
@@ -33,6 +36,8 @@ from hecbench.recording import Recording
 
 _STEPS: tuple[Callable[[Examination], tuple[Finding | None, Examination]], ...] = (
     image_quality.examine,
+    repeats.examine,
+    camera_frame.examine,
     picture_residual.examine,
     joints_vs_pose.examine,
     sample_moving.examine,
@@ -41,6 +46,7 @@ _STEPS: tuple[Callable[[Examination], tuple[Finding | None, Examination]], ...] 
     units.examine,
     pairing.examine,
     intrinsics.examine,
+    rotation_reading.examine,
     consistency.examine,
     target_scale.examine,
     outlier_sample.examine,

@@ -29,9 +29,12 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
     flatness = float(extents_m[2] / extents_m[0])
     distance_m = float(np.median(positions[:, 2]))
     size = " x ".join(f"{1e3 * extent:.0f}" for extent in extents_m)
-    summary = f"{len(positions)} samples, target positions spread by {size} mm rms at {distance_m:.2g} m"
+    samples = f"{len(positions)} samples"
+    if case.pictures > len(case.recording):
+        samples = f"{case.pictures} samples at {len(positions)} robot poses, which count once each"
+    summary = f"{samples}, target positions spread by {size} mm rms at {distance_m:.2g} m"
     if len(positions) < FEW_SAMPLES:
-        action = "record 10 or more samples"
+        action = "record samples at 10 or more robot poses"
         return Finding(ID, Severity.WARNING, summary, action, float(len(positions)), float(FEW_SAMPLES)), case
     if flatness < FLAT:
         summary += ": they lie in a plane"

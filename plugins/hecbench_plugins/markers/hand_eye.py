@@ -7,7 +7,7 @@ X = parent_T_camera and Y = carrier_T_target are constant; the hand poses H fold
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -19,6 +19,7 @@ from hecbench.agreement import contradiction
 from hecbench.errors import Refusal, SolverFailure
 from hecbench.estimate import Estimate
 from hecbench.recording import Recording
+from hecbench.standstills import merged
 from hecbench_plugins.markers.target_poses import target_poses
 
 Array = NDArray[np.float64]
@@ -73,7 +74,7 @@ class PosedSamples:
 
 
 def pose_pairs(recording: Recording) -> PosedSamples:
-    """The samples with a hand pose and a target pose, once they are known to determine X.
+    """The samples with a hand pose and a target pose, once they are known to determine X; one per robot pose.
 
     They are sorted by hand pose, whatever order they were taken in: the motions of a pair and of its reverse
     weigh translation noise differently, so methods on motions would otherwise depend on the order of the
@@ -82,6 +83,7 @@ def pose_pairs(recording: Recording) -> PosedSamples:
     Raises:
         Refusal: too few samples, or the hand does not rotate about two axes.
     """
+    recording = merged(replace(recording, camera_T_target=target_poses(recording)))
     hand, camera_T_target = recording.hand_poses(), target_poses(recording)
     both = np.isfinite(hand).all((1, 2)) & np.isfinite(camera_T_target).all((1, 2))
     hand, camera_T_target = hand[both], camera_T_target[both]

@@ -8,7 +8,7 @@ flips do no harm.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -19,6 +19,7 @@ from hecbench.agreement import LARGEST_SHARE, percent, share_left
 from hecbench.errors import Refusal, SolverFailure
 from hecbench.estimate import Estimate, Termination
 from hecbench.recording import Recording
+from hecbench.standstills import merged
 from hecbench_plugins.markers.hand_eye import MINIMUM_ROTATION_DEG, rotation_diversity_deg
 from hecbench_plugins.markers.target_poses import target_poses
 
@@ -104,6 +105,7 @@ def marker_positions(recording: Recording) -> MarkerPositions:
     Raises:
         Refusal: fewer than 3 samples, or the hand does not rotate about two axes.
     """
+    recording = merged(replace(recording, camera_T_target=target_poses(recording)))
     hand, camera_T_target = recording.hand_poses(), target_poses(recording)
     both = np.isfinite(hand).all((1, 2)) & np.isfinite(camera_T_target).all((1, 2))
     marker = np.zeros(3) if recording.target is None else recording.target.points_m.mean(0)
