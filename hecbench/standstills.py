@@ -41,7 +41,7 @@ def standstills(base_T_flange: Array) -> Labels:
     return np.asarray(connected_components(links, directed=False)[1], np.int64)
 
 
-def merged(recording: Recording) -> Recording:
+def one_per_robot_pose(recording: Recording) -> Recording:
     """One sample per robot pose, with the means of its corners and poses; as it is where none is repeated.
 
     Samples whose target moved although the arm is said to have stood still stay apart.

@@ -10,6 +10,7 @@ from collections.abc import Callable
 
 from hecbench.diagnose import (
     camera_frame,
+    clock_lag,
     conditioning,
     consistency,
     coverage,
@@ -44,6 +45,7 @@ _STEPS: tuple[Callable[[Examination], tuple[Finding | None, Examination]], ...] 
     rotation_diversity.examine,
     pose_direction_or_mounting.examine,
     units.examine,
+    clock_lag.examine,
     pairing.examine,
     intrinsics.examine,
     rotation_reading.examine,

@@ -13,7 +13,7 @@ from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity, names
 from hecbench.diagnose.fit import LEAST_SAMPLES
 from hecbench.recording import Recording
-from hecbench.standstills import merged
+from hecbench.standstills import one_per_robot_pose
 
 Array = NDArray[np.float64]
 Samples = NDArray[np.bool_]
@@ -41,7 +41,7 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
     stale = _repeated(poses.reshape(len(poses), -1), lambda same: _target_moves(seen, same))
     if stale.any():
         return _finding(case, stale, "robot", "target")
-    return None, replace(case, recording=merged(case.recording))
+    return None, replace(case, recording=one_per_robot_pose(case.recording))
 
 
 def _seen(recording: Recording) -> Array | None:
@@ -89,4 +89,4 @@ def _finding(case: Examination, stale: Samples, frozen: str, moving: str) -> tup
     rest = np.flatnonzero(~stale)
     if len(rest) <= LEAST_SAMPLES:
         return finding, replace(case, judged=False)
-    return finding, replace(case, recording=merged(case.recording.subset(rest)))
+    return finding, replace(case, recording=one_per_robot_pose(case.recording.subset(rest)))

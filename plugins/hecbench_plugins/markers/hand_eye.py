@@ -19,7 +19,7 @@ from hecbench.agreement import contradiction
 from hecbench.errors import Refusal, SolverFailure
 from hecbench.estimate import Estimate
 from hecbench.recording import Recording
-from hecbench.standstills import merged
+from hecbench.standstills import one_per_robot_pose
 from hecbench_plugins.markers.target_poses import target_poses
 
 Array = NDArray[np.float64]
@@ -83,14 +83,39 @@ def pose_pairs(recording: Recording) -> PosedSamples:
     Raises:
         Refusal: too few samples, or the hand does not rotate about two axes.
     """
-    recording = merged(replace(recording, camera_T_target=target_poses(recording)))
-    hand, camera_T_target = recording.hand_poses(), target_poses(recording)
-    both = np.isfinite(hand).all((1, 2)) & np.isfinite(camera_T_target).all((1, 2))
-    hand, camera_T_target = hand[both], camera_T_target[both]
+    hand, camera_T_target = posed_samples(recording)
     order = np.lexsort(hand[:, :3].reshape(len(hand), -1).T)
     pairs = PosedSamples(hand[order], camera_T_target[order])
     require_two_rotation_axes(pairs)
     return pairs
+
+
+def posed_samples(recording: Recording) -> tuple[Array, Array]:
+    """H and camera_T_target, each (N, 4, 4) m, of the samples that have both; one per robot pose.
+
+    Raises:
+        Refusal: fewer than 3.
+    """
+    posed = replace(recording, camera_T_target=target_poses(recording))
+    both = _both(posed)
+    posed = posed.subset(np.flatnonzero(both)) if both.any() else posed
+    once = one_per_robot_pose(posed)
+    both = _both(once)
+    if both.sum() < MINIMUM_SAMPLES <= len(posed):
+        raise Refusal(f"the hand hardly rotates: {len(posed)} samples stand at {both.sum()} robot poses")
+    if both.sum() < MINIMUM_SAMPLES:
+        raise Refusal(
+            f"{both.sum()} samples have a robot and a target pose; at least {MINIMUM_SAMPLES} are needed"
+        )
+    assert once.camera_T_target is not None
+    return once.hand_poses()[both], once.camera_T_target[both]
+
+
+def _both(recording: Recording) -> NDArray[np.bool_]:
+    """Which samples have a robot pose and a target pose."""
+    assert recording.camera_T_target is not None
+    known = np.isfinite(recording.hand_poses()).all((1, 2))
+    return np.asarray(known & np.isfinite(recording.camera_T_target).all((1, 2)))
 
 
 def rotation_diversity_deg(rotation_logs: Array) -> Array:
@@ -101,15 +126,11 @@ def rotation_diversity_deg(rotation_logs: Array) -> Array:
 
 
 def require_two_rotation_axes(pairs: PosedSamples) -> None:
-    """Raise `Refusal` unless the samples are enough and both hand and target rotate about two axes.
+    """Raise `Refusal` unless both hand and target rotate about two axes.
 
     With one axis only, the translation along it is unobservable to every method (Tsai and Lenz 1989, section
     III).
     """
-    if len(pairs) < MINIMUM_SAMPLES:
-        raise Refusal(
-            f"{len(pairs)} samples have a robot and a target pose; at least {MINIMUM_SAMPLES} are needed"
-        )
     for name, logs in zip(("hand", "target"), pairs.rotation_logs, strict=True):
         first, second, _ = np.append(rotation_diversity_deg(logs), 0.0)[:3]
         if first < MINIMUM_ROTATION_DEG:

@@ -15,7 +15,7 @@ from hecbench.errors import Refusal, SolverFailure
 from hecbench.estimate import Estimate
 from hecbench.lens import FixedSensor, Sensor, parameters_of
 from hecbench.recording import Recording
-from hecbench.standstills import merged
+from hecbench.standstills import one_per_robot_pose
 from hecbench_plugins.markers import single3d
 from hecbench_plugins.markers.hand_eye import pose_pairs
 from hecbench_plugins.markers.opencv_hand_eye import robot_world
@@ -40,7 +40,7 @@ def corner_problem(recording: Recording, prior_sigmas: Array | None = None) -> P
         Refusal: no corners, intrinsics or robot poses, or the samples do not determine X.
     """
     pose_pairs(recording)
-    recording = merged(recording)
+    recording = one_per_robot_pose(recording)
     camera, target, corners_px = recording.camera, recording.target, recording.corners_px
     if camera is None or camera.K is None or target is None or corners_px is None:
         raise Refusal("needs corners_px, target and camera.K")
@@ -70,7 +70,7 @@ def adjust_with_exact_robot(recording: Recording, problem: Problem) -> Solution:
         Refusal: no method gives a start.
         SolverFailure: what is left is not small against the target's own motion in the image.
     """
-    recording, noise = merged(recording), Noise(DEFAULT_NOISE.observed)
+    recording, noise = one_per_robot_pose(recording), Noise(DEFAULT_NOISE.observed)
     starts = sorted(_starts(recording, problem), key=lambda state: linearise(problem, state, noise).cost)
     if not starts:
         raise Refusal("neither single3d nor shah gives a start on this recording")

@@ -8,7 +8,7 @@ flips do no harm.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -19,9 +19,7 @@ from hecbench.agreement import LARGEST_SHARE, percent, share_left
 from hecbench.errors import Refusal, SolverFailure
 from hecbench.estimate import Estimate, Termination
 from hecbench.recording import Recording
-from hecbench.standstills import merged
-from hecbench_plugins.markers.hand_eye import MINIMUM_ROTATION_DEG, rotation_diversity_deg
-from hecbench_plugins.markers.target_poses import target_poses
+from hecbench_plugins.markers.hand_eye import MINIMUM_ROTATION_DEG, posed_samples, rotation_diversity_deg
 
 Array = NDArray[np.float64]
 
@@ -105,13 +103,8 @@ def marker_positions(recording: Recording) -> MarkerPositions:
     Raises:
         Refusal: fewer than 3 samples, or the hand does not rotate about two axes.
     """
-    recording = merged(replace(recording, camera_T_target=target_poses(recording)))
-    hand, camera_T_target = recording.hand_poses(), target_poses(recording)
-    both = np.isfinite(hand).all((1, 2)) & np.isfinite(camera_T_target).all((1, 2))
+    chosen, camera_T_target = posed_samples(recording)
     marker = np.zeros(3) if recording.target is None else recording.target.points_m.mean(0)
-    chosen = hand[both]
-    if len(chosen) < 3:
-        raise Refusal(f"{len(chosen)} samples have a robot and a target pose; at least 3 are needed")
     some = chosen[:: 1 + len(chosen) // _MOST_COMPARED, :3, :3]
     i, j = np.triu_indices(len(some), 1)
     logs = se3.so3_log(np.swapaxes(some[i], 1, 2) @ some[j])
@@ -121,7 +114,7 @@ def marker_positions(recording: Recording) -> MarkerPositions:
             f"the hand rotates by {diversity_deg[0]:.3g} deg rms about one axis and {diversity_deg[1]:.2g} "
             "about any other: add samples turned by 20 deg or more about a second axis"
         )
-    return MarkerPositions(chosen, se3.transform_points(camera_T_target[both], marker[None])[:, 0])
+    return MarkerPositions(chosen, se3.transform_points(camera_T_target, marker[None])[:, 0])
 
 
 def closed_form(positions: MarkerPositions, *, reference_projection: bool = False) -> Array:
