@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,8 @@ Array = NDArray[np.float64]
 _ITERATIONS = 30
 _CONVERGED = 1e-10
 """Relative fall of the cost."""
+_EXACT = 1e-16
+"""px^2."""
 _SHARED_CONVERGED = 1e-6
 
 
@@ -35,6 +37,11 @@ class Normals:
     by_pose: Array
     by_shared: Array
     points_c: Array
+
+    def where(self, better: NDArray[np.bool_], there: Normals) -> Normals:
+        """These, with the pictures that are `better` (M,) from elsewhere."""
+        pairs = [(getattr(self, item.name), getattr(there, item.name)) for item in fields(self)]
+        return Normals(*(np.where(better.reshape(-1, *[1] * (a.ndim - 1)), b, a) for a, b in pairs))
 
 
 def linearised(
@@ -75,14 +82,12 @@ def refined(
         moved = se3.exp(-np.linalg.solve(_damped(information, damping[:, None]), gradient)[..., 0]) @ poses
         there = linearised(moved, points_m, corners_px, sensor, none)
         better = there.costs <= at.costs
-        gained = np.subtract(
-            at.costs, there.costs, where=better & np.isfinite(at.costs), out=np.zeros(len(poses))
-        )
+        both = np.isfinite(at.costs) & np.isfinite(there.costs)
+        change = np.subtract(at.costs, there.costs, where=both, out=np.full(len(poses), np.inf))
         poses[better] = moved[better]
         damping = np.where(better, np.maximum(damping / 10, 1e-12), damping * 10)
-        settled = (gained <= _CONVERGED * there.costs + 1e-18) & (better | (damping > 1e6))
-        at = linearised(poses, points_m, corners_px, sensor, none)
-        if settled.all():
+        at = at.where(better, there)
+        if (np.abs(change) <= _CONVERGED * at.costs + _EXACT).all():
             break
     seen = np.isfinite(corners_px).all(-1).sum(1)
     return poses, np.sqrt(at.costs / np.maximum(seen, 1))

@@ -32,7 +32,7 @@ from hecbench.diagnose import (
     units,
 )
 from hecbench.diagnose.case import Examination
-from hecbench.diagnose.finding import Finding
+from hecbench.diagnose.finding import Finding, Severity
 from hecbench.recording import Recording
 
 _STEPS: tuple[Callable[[Examination], tuple[Finding | None, Examination]], ...] = (
@@ -72,4 +72,7 @@ def check(recording: Recording, prepared: Recording | None = None) -> list[Findi
         finding, case = examine(case)
         if finding is not None:
             findings.append(finding)
-    return findings
+    faulty = {finding.id for finding in findings if finding.severity is not Severity.OK}
+    return [
+        finding for finding in findings if finding.severity is not Severity.OK or finding.id not in faulty
+    ]

@@ -22,6 +22,9 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
             return None, case
         summary = f"{len(case.usable)} samples have a robot pose and a target pose"
         severity = Severity.INFO if len(case.usable) >= FEW_SAMPLES else Severity.WARNING
+        if not len(case.usable):
+            summary = "no sample has a robot pose and a target pose: there is nothing to examine"
+            severity = Severity.CRITICAL
         action = "" if severity is Severity.INFO else "record 10 or more samples that show the target"
         return Finding(ID, severity, summary, action, float(len(case.usable)), float(FEW_SAMPLES)), case
     positions = case.agreed[0].camera_T_target[:, :3, 3]

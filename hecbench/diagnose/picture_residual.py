@@ -8,13 +8,30 @@ import numpy as np
 
 from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity
-from hecbench.diagnose.rivals import BOARD, GIVEN, LENS, MATRIX, ORDER, Judged, comparable, judged, rivals
+from hecbench.diagnose.rivals import (
+    BOARD,
+    GIVEN,
+    LENS,
+    MATRIX,
+    ORDER,
+    RESOLUTION,
+    Judged,
+    comparable,
+    judged,
+    rivals,
+)
 from hecbench.lens import parameters_of
 from hecbench.recording import EQUIDISTANT, CameraModel
 from hecbench.targets import PointsTarget
 
 ID = "picture_residual"
-IDS = {LENS: "lens_model", MATRIX: "intrinsics", BOARD: "target_shape", ORDER: "corner_order"}
+IDS = {
+    LENS: "lens_model",
+    MATRIX: "intrinsics",
+    RESOLUTION: "intrinsics",
+    BOARD: "target_shape",
+    ORDER: "corner_order",
+}
 """The finding that names each cause."""
 _MOST_PICTURES = 40
 _CLEARLY = 20.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.bundle.pictures import SharedFit, fit_shared
+from hecbench.diagnose.resolution import BY_SIZE, rescaled
 from hecbench.lens import Sensor, parameters_of, project
 from hecbench.preparation import prepare
 from hecbench.recording import EQUIDISTANT, OPENCV, CameraModel, Recording
@@ -27,7 +28,7 @@ _BAD_PICTURE = 4.0
 
 _MATRIX_FREE: tuple[tuple[int | str, ...], ...] = (("focal",), (0, 1), (2, 3), ("focal", 2, 3), (0, 1, 2, 3))
 
-LENS, MATRIX, BOARD, ORDER, GIVEN = "lens", "matrix", "board", "order", "given"
+LENS, MATRIX, RESOLUTION, BOARD, ORDER, GIVEN = "lens", "matrix", "resolution", "board", "order", "given"
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,14 +67,17 @@ class Judged:
     score: float
 
 
-def judged(rivals: Iterator[Rival]) -> list[Judged]:
-    """The rivals that can be fitted, best first; the pictures that the first one cannot fit at all are left out."""
-    found = [result for rival in rivals if (result := _judged(rival)) is not None]
-    return sorted(found, key=lambda result: result.score)
+def judged(rivals: Iterable[Rival]) -> list[Judged]:
+    """The rivals that can be fitted, best first."""
+    rivals = list(rivals)
+    recordings = {id(rival.recording): rival.recording for rival in rivals}
+    posed = {key: prepare(replace(each, camera_T_target=None)) for key, each in recordings.items()}
+    found = [_judged(rival, posed[id(rival.recording)]) for rival in rivals]
+    return sorted((result for result in found if result is not None), key=lambda result: result.score)
 
 
-def _judged(rival: Rival) -> Judged | None:
-    recording = prepare(replace(rival.recording, camera_T_target=None))
+def _judged(rival: Rival, recording: Recording) -> Judged | None:
+    """The rival's unknowns fitted from its recording's target poses; None when too few numbers determine them."""
     poses, corners, target, camera = (
         recording.camera_T_target,
         recording.corners_px,
@@ -157,13 +161,15 @@ def rivals(recording: Recording) -> Iterator[Rival]:
     yield from _other_lenses(recording, camera)
     last = 4 + len(camera.distortion)
     yield Rival(BOARD, "the squares are not square", "", recording, (last,))
+    for ratio, scaled in rescaled(camera):
+        says = f"the intrinsics are of another resolution: times {ratio:.3g} they fit"
+        yield Rival(RESOLUTION, says, BY_SIZE, replace(recording, camera=scaled))
     for free in _MATRIX_FREE:
         yield Rival(MATRIX, "camera.K does not belong to these pictures", "", recording, free)
     for start, coefficients in _refits(camera):
-        says = "the lens model does not belong to these pictures"
-        yield Rival(LENS, says, "", replace(recording, camera=start), coefficients)
-        both = (0, 1, 2, 3, *coefficients)
-        yield Rival(LENS, f"{says}, nor does camera.K", "", replace(recording, camera=start), both)
+        says, refitted = "the lens model does not belong to these pictures", replace(recording, camera=start)
+        yield Rival(LENS, says, "", refitted, coefficients)
+        yield Rival(LENS, f"{says}, nor does camera.K", "", refitted, (0, 1, 2, 3, *coefficients))
 
 
 def _refits(camera: CameraModel) -> Iterator[tuple[CameraModel, tuple[int, ...]]]:

@@ -25,7 +25,7 @@ from hecbench_plugins.markers.target_poses import target_poses
 Array = NDArray[np.float64]
 
 MINIMUM_SAMPLES = 3
-_MOST_COMPARED = 400
+_MOST_COMPARED = 800
 """Samples whose motions are all formed: their number, and OpenCV's time, grow with the square."""
 MINIMUM_ROTATION_DEG = 1.0
 """Rms rotation that must remain about a second axis, ten times a good robot's noise, or nothing is
@@ -54,7 +54,7 @@ class PosedSamples:
 
     @cached_property
     def compared(self) -> PosedSamples:
-        """The samples whose motions are formed: these, or 400 evenly spread ones of more."""
+        """The samples whose motions are formed: these, or 800 evenly spread ones of more."""
         if len(self) <= _MOST_COMPARED:
             return self
         return self.subset(np.linspace(0, len(self) - 1, _MOST_COMPARED).astype(int))
@@ -126,11 +126,13 @@ def rotation_diversity_deg(rotation_logs: Array) -> Array:
 
 
 def require_two_rotation_axes(pairs: PosedSamples) -> None:
-    """Raise `Refusal` unless both hand and target rotate about two axes.
+    """Raise `Refusal` unless the samples are enough and both hand and target rotate about two axes.
 
     With one axis only, the translation along it is unobservable to every method (Tsai and Lenz 1989, section
     III).
     """
+    if len(pairs) < MINIMUM_SAMPLES:
+        raise Refusal(f"{len(pairs)} samples are left; at least {MINIMUM_SAMPLES} are needed")
     for name, logs in zip(("hand", "target"), pairs.rotation_logs, strict=True):
         first, second, _ = np.append(rotation_diversity_deg(logs), 0.0)[:3]
         if first < MINIMUM_ROTATION_DEG:
