@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from itertools import product
 
+import numba
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+
+_jit = numba.njit(cache=True, nogil=True)
 
 _PIXELS = 256
 """Along the longest side of the link."""
@@ -59,7 +61,7 @@ def seen_from_behind(vertices: Array, faces: NDArray[np.integer]) -> NDArray[np.
     return seen
 
 
-@njit(cache=True)
+@_jit  # type: ignore[untyped-decorator]
 def _draw(
     places: Array, faces: NDArray[np.integer], size: NDArray[np.int64], slack: float, seen: NDArray[np.bool_]
 ) -> None:
