@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hecbench import cache
 from hecbench.robots import materials, mesh_files
 from hecbench.robots.materials import referenced_files
 from hecbench.robots.sheets import seen_from_behind
@@ -61,9 +62,7 @@ def visual_parts(visuals: Sequence[Visual], urdf: Path) -> tuple[tuple[Part, ...
         if isinstance(visual.shape, Mesh)
     }
     textures = {visual.texture: find_texture(visual.texture, urdf) for visual in visuals if visual.texture}
-    entry = (
-        _cache_folder() / f"robot-{_digest(urdf, {*found.values(), *filter(None, textures.values())})}.npz"
-    )
+    entry = cache.folder() / f"robot-{_digest(urdf, {*found.values(), *filter(None, textures.values())})}.npz"
     if (cached := _read(entry)) is not None:
         return cached
     notes: list[str] = []
@@ -137,10 +136,6 @@ def _seen_from_both_sides(parts: tuple[Part, ...]) -> tuple[Part, ...]:
         for i, both in zip(of_link, np.split(behind, ends), strict=True):
             marked[i] = replace(parts[i], both_sides=both)
     return tuple(marked)
-
-
-def _cache_folder() -> Path:
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "hecbench"
 
 
 def _digest(urdf: Path, used: Iterable[Path]) -> str:
