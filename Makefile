@@ -2,7 +2,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 TEST_ARGS ?=
 
-.PHONY: demo test graphics lint bench clean
+.PHONY: demo test graphics lint docs bench mutants clean
 
 demo: .venv/base
 	$(BIN)/hecbench demo --out out/demo
@@ -21,6 +21,12 @@ lint: .venv/dev
 	$(BIN)/mypy
 	$(BIN)/lint-imports
 
+docs: .venv/docs
+	$(BIN)/mkdocs build --strict --quiet
+
+mutants: .venv/dev
+	$(BIN)/python benchmarks/mutants.py $(TEST_ARGS)
+
 bench: .venv/dev
 	$(BIN)/python -m pytest benchmarks -p no:xdist --benchmark-only --timeout=0 -s $(TEST_ARGS)
 
@@ -37,5 +43,9 @@ bench: .venv/dev
 	$(BIN)/pip install --quiet --constraint constraints.txt --editable '.[dev]'
 	touch $@ .venv/base
 
+.venv/docs: .venv/bin/python pyproject.toml constraints.txt
+	$(BIN)/pip install --quiet --constraint constraints.txt --editable '.[docs]'
+	touch $@
+
 clean:
-	rm -rf .venv out build dist
+	rm -rf .venv out build dist site

@@ -1,3 +1,3 @@
-"""hecbench: hand-eye calibrators of every kind on the same recordings, by the same rulers."""
+"""hecbench: hand-eye calibrators of every kind, measured on the same recordings."""
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"

@@ -3,26 +3,29 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
 from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hecbench import se3
+from hecbench import pictures, se3
 from hecbench.errors import InputError, Refusal
 from hecbench.targets import Target
 
 Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
+_Value = TypeVar("_Value", np.uint8, np.bool_)
 ImageSource = Path | Image | None
 """A file that is decoded when asked for, an array in memory, or nothing for this sample."""
 
-DISTORTION_LENGTHS = (0, 4, 5, 8, 12, 14)
+OPENCV, EQUIDISTANT = "opencv", "equidistant"
+DISTORTION_LENGTHS = {OPENCV: (0, 4, 5, 8, 12, 14), EQUIDISTANT: (0, 4)}
+"""Numbers of coefficients of each lens model."""
 _ROTATION_TOLERANCE = 1e-3
 
 
@@ -70,13 +73,15 @@ class CameraModel:
         width: of the image, px.
         height: of the image, px.
         K: (3, 3) px, or None when it is still to be calibrated from the images.
-        distortion: (0 | 4 | 5 | 8 | 12 | 14,) coefficients in OpenCV's order.
+        distortion: (0 | 4 | 5 | 8 | 12 | 14,) coefficients in OpenCV's order; none or k1 to k4 of an equidistant lens.
+        distortion_model: "opencv" or "equidistant" (fisheye); see `hecbench.lens`.
     """
 
     width: int
     height: int
     K: Array | None = None
     distortion: Array = field(default_factory=lambda: np.zeros(0))
+    distortion_model: str = OPENCV
 
     def __post_init__(self) -> None:
         if self.width < 1 or self.height < 1:
@@ -91,11 +96,19 @@ class CameraModel:
                 raise InputError("camera.K: is the identity; give the intrinsics in px, or null if unknown")
             object.__setattr__(self, "K", K)
         distortion = np.asarray(self.distortion, float).reshape(-1)
-        if len(distortion) not in DISTORTION_LENGTHS or not np.isfinite(distortion).all():
+        if self.distortion_model not in DISTORTION_LENGTHS:
             raise InputError(
-                f"camera.distortion: {len(distortion)} numbers; give {DISTORTION_LENGTHS} finite ones"
+                f"camera.distortion_model: '{self.distortion_model}' is not one of {', '.join(DISTORTION_LENGTHS)}"
             )
+        lengths = DISTORTION_LENGTHS[self.distortion_model]
+        if len(distortion) not in lengths or not np.isfinite(distortion).all():
+            raise InputError(f"camera.distortion: {len(distortion)} numbers; give {lengths} finite ones")
         object.__setattr__(self, "distortion", distortion)
+
+    @property
+    def is_pinhole(self) -> bool:
+        """Whether the lens bends no ray."""
+        return self.distortion_model == OPENCV and not self.distortion.any()
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -117,7 +130,7 @@ class Recording:
         corners_px: (N, P, 2), one row per target point.
         robot_stamp_s, camera_stamp_s: (N,).
         images: N sources of (height, width, 3) RGB.
-        masks: N sources of (height, width), above 127 = robot.
+        masks: N sources of (height, width), above 127 = robot, or 0 and 1.
         folder: where it was read from, None when generated.
         notes: what its importer found out about its conventions, to be said to the user; not saved.
     """
@@ -268,28 +281,30 @@ class Recording:
         return replace(self, truth_parent_T_camera=None)
 
     def image(self, index: int) -> Image:
-        """Decode one image, (height, width, 3) RGB.
+        """Decode one image, (height, width, 3) RGB, as `pictures.image` reads it.
 
         Raises:
             InputError: it is absent, unreadable, or not of the camera's size.
         """
-        return self._picture("images", index, "RGB")
+        return self._picture("images", index, pictures.image)
 
     def mask(self, index: int) -> NDArray[np.bool_]:
-        """Decode one mask, (height, width), True on the robot.
+        """Decode one mask, (height, width), True on the robot, as `pictures.mask` reads it.
 
         Raises:
             InputError: it is absent, unreadable, or not of the camera's size.
         """
-        return self._picture("masks", index, "L") > 127
+        return self._picture("masks", index, pictures.mask)
 
-    def _picture(self, name: str, index: int, mode: str) -> Image:
+    def _picture(
+        self, name: str, index: int, decode: Callable[[Path | Image, str], NDArray[_Value]]
+    ) -> NDArray[_Value]:
         sources = getattr(self, name)
         source = sources[index] if sources else None
         where = f"samples[{index}].{name.removesuffix('s')}"
         if source is None:
             raise InputError(f"{self.name}: {where}: there is none")
-        picture = _decode(source, mode) if isinstance(source, Path) else source
+        picture = decode(source, str(source) if isinstance(source, Path) else f"{self.name}: {where}")
         if self.camera and picture.shape[:2] != (self.camera.height, self.camera.width):
             height, width = picture.shape[:2]
             raise InputError(
@@ -345,16 +360,6 @@ def _rigid(poses: Array, name: str) -> Array:
         poses = poses.copy()
         poses[rounded, :3, :3] = se3.nearest_rotation(poses[rounded, :3, :3])
     return poses
-
-
-def _decode(path: Path, mode: str) -> Image:
-    from PIL import Image as PillowImage
-
-    try:
-        with PillowImage.open(path) as picture:
-            return np.asarray(picture.convert(mode))
-    except (OSError, SyntaxError, ValueError) as error:  # Pillow raises all three on damaged files
-        raise InputError(f"{path}: cannot be read as an image ({error}); restore the file") from error
 
 
 def _update(digest: Any, value: Any) -> None:

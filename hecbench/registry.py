@@ -15,15 +15,20 @@ from functools import cache
 from importlib import import_module, metadata
 from importlib.util import find_spec
 from types import ModuleType
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 import pluggy
 
 from hecbench import hookspecs
 from hecbench.errors import InputError
-from hecbench.specs import AnySpec, Kind, SolverSpec, Spec
+from hecbench.specs import AnySpec, ConfigurableSpec, Kind, SolverSpec, Spec
+
+_WITH_OPTIONS = (Kind.SOLVER, Kind.SEGMENTER, Kind.TRANSLATOR)
+"""Kinds whose specs are `ConfigurableSpec`."""
 
 hookimpl = pluggy.HookimplMarker(hookspecs.GROUP)
+
+OWN_DISTRIBUTION = "hecbench"
 
 TrialObserver = Callable[..., object]
 """Called as `observer(trial=TrialRecord)`."""
@@ -68,7 +73,7 @@ class Plugin:
     def _about(self) -> str:
         if self.spec is None:
             return ""
-        options = self.spec.options if isinstance(self.spec, SolverSpec) else ()
+        options = self.spec.options if isinstance(self.spec, ConfigurableSpec) else ()
         told = "".join(f"; [{option.name}=...]: {option.summary}" for option in options)
         return self.spec.summary + told
 
@@ -89,12 +94,20 @@ class Registry:
         specs = [plugin.spec for plugin in self.select(kind) if plugin.status is PluginStatus.READY]
         return [spec for spec in specs if isinstance(spec, spec_type)]
 
+    def is_foreign(self, solver: str) -> bool:
+        """Whether the solver of that name, options set in it or not, comes from another distribution than ours."""
+        plain, _ = _settings(Kind.SOLVER, solver)
+        return any(
+            plugin.kind is Kind.SOLVER and plugin.name == plain and plugin.distribution != OWN_DISTRIBUTION
+            for plugin in self.plugins
+        )
+
     def get(self, kind: Kind, name: str, spec_type: type[AnySpecT]) -> AnySpecT:
         """The ready spec of that name; otherwise an `InputError` that says why not and what there is.
 
-        A solver's name may set options of it: ``name[option=value,...]``.
+        The name of a solver, segmenter or translator may set options of it: ``name[option=value,...]``.
         """
-        plain, settings = _settings(name) if kind is Kind.SOLVER else (name, {})
+        plain, settings = _settings(kind, name) if kind in _WITH_OPTIONS else (name, {})
         found = [plugin for plugin in self.select(kind) if plugin.name == plain]
         if not found:
             names = ", ".join(spec.name for spec in self.ready(kind, spec_type)) or "none"
@@ -102,17 +115,28 @@ class Registry:
         plugin = found[0]
         if plugin.status is not PluginStatus.READY or not isinstance(plugin.spec, spec_type):
             raise InputError(f"{kind} '{plain}' is {plugin.status}: {plugin.detail}")
-        return plugin.spec.configured(settings) if isinstance(plugin.spec, SolverSpec) else plugin.spec
+        return plugin.spec.configured(settings) if isinstance(plugin.spec, ConfigurableSpec) else plugin.spec
+
+    def named(self, name: str, kind: str | None = None) -> AnySpec:
+        """The ready spec of that name, of any kind; an `InputError` when plugins of several kinds have the name."""
+        if kind is not None and kind not in list(Kind):
+            raise InputError(f"--kind {kind}: choose one of {', '.join(Kind)}")
+        plain = name.partition("[")[0]
+        kinds = [plugin.kind for plugin in self.plugins if plugin.name == plain and plugin.kind is not None]
+        if kind is None and len(set(kinds)) > 1:
+            raise InputError(f"'{plain}' is a {' and a '.join(kinds)}: name one with --kind")
+        wanted = Kind(kind) if kind is not None else next(iter(kinds), Kind.SOLVER)
+        return cast("AnySpec", self.get(wanted, name, Spec))
 
 
-def _settings(name: str) -> tuple[str, dict[str, str]]:
-    """A solver's name and the options set in it: ``name[option=value,...]``."""
+def _settings(kind: Kind, name: str) -> tuple[str, dict[str, str]]:
+    """A plugin's name and the options set in it: ``name[option=value,...]``."""
     plain, bracket, rest = name.partition("[")
     if not bracket:
         return name, {}
     pairs = [setting.partition("=") for setting in rest.removesuffix("]").split(",")]
     if not rest.endswith("]") or not all(option and equals for option, equals, _ in pairs):
-        raise InputError(f"solver '{name}': write options as {plain or 'solver'}[option=value,option=value]")
+        raise InputError(f"{kind} '{name}': write options as {plain or kind}[option=value,option=value]")
     return plain, {option.strip(): value.strip() for option, _, value in pairs}
 
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from hecbench import se3
+from hecbench import pictures, se3
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
 from hecbench.registry import hookimpl
@@ -26,7 +26,6 @@ from hecbench_datasets.reading.sources import (
     finite,
     foreign,
     head,
-    image_size,
     item,
     json_value,
 )
@@ -47,9 +46,7 @@ def load(path: Path) -> Recording:
     if not counts:
         raise InputError(f"{path / _OBJECTS}: lists no object")
     wanted = counts.most_common(1)[0][0]
-    pictures = {
-        file.stem: file for kind in ("rgb", "gray") for file in files_in(path / kind, *IMAGE_SUFFIXES)
-    }
+    files = {file.stem: file for kind in ("rgb", "gray") for file in files_in(path / kind, *IMAGE_SUFFIXES)}
     ids, base_T_flange, camera_T_target, intrinsics, images = [], [], [], [], []
     for key, camera in cameras.items():
         seen = next((view for view in objects.get(key, ()) if view["obj_id"] == wanted), None)
@@ -59,7 +56,7 @@ def load(path: Path) -> Recording:
         base_T_flange.append(se3.inverse(_pose(camera, "cam_R_w2c", "cam_t_w2c", path / _CAMERA, key)))
         camera_T_target.append(_pose(seen, "cam_R_m2c", "cam_t_m2c", path / _OBJECTS, key))
         intrinsics.append(finite(item(camera, "cam_K", path / _CAMERA), f"{path / _CAMERA}: cam_K", (3, 3)))
-        images.append(pictures.get(ids[-1]))
+        images.append(files.get(ids[-1]))
     if not ids:
         raise InputError(f"{path}: no image has both cam_R_w2c and object {wanted}")
     first = next((image for image in images if image is not None), None)
@@ -70,7 +67,7 @@ def load(path: Path) -> Recording:
         mounting=Mounting.EYE_IN_HAND,
         sample_ids=tuple(ids),
         robot=RobotDescription(base_link="world", flange_link="reported_camera"),
-        camera=None if first is None else CameraModel(*image_size(first), intrinsics[0]),
+        camera=None if first is None else CameraModel(*pictures.size(first), intrinsics[0]),
         base_T_flange=np.array(base_T_flange),
         camera_T_target=np.array(camera_T_target),
         images=tuple(images) if first else None,

@@ -9,9 +9,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from pathlib import Path, PurePosixPath
 
-from hecbench import files, se3
+import numpy as np
+
+from hecbench import files, pictures, se3
 from hecbench.errors import InputError
-from hecbench.recording import CameraModel, ImageSource, Mounting, Recording, RobotDescription
+from hecbench.recording import CameraModel, Image, ImageSource, Mounting, Recording, RobotDescription
 from hecbench.registry import hookimpl
 from hecbench.specs import DatasetSpec
 from hecbench_datasets.reading.arms import PANDA
@@ -20,9 +22,7 @@ from hecbench_datasets.reading.sources import (
     files_in,
     finite,
     foreign,
-    image_size,
     natural,
-    picture,
     table,
     zip_bytes,
     zip_names,
@@ -63,7 +63,7 @@ def load(path: Path) -> Recording:
         else (lambda name: zip_bytes(place, prefix + name))
     )
 
-    def pictures(kind: str, mode: str) -> tuple[ImageSource, ...]:
+    def sources(kind: str, decode: Callable[[bytes, str], Image]) -> tuple[ImageSource, ...]:
         by_id = {PurePosixPath(name).stem: name for name in names if name.startswith(f"{kind}/")}
         found: list[ImageSource] = []
         for sample_id in ids:
@@ -71,7 +71,7 @@ def load(path: Path) -> Recording:
             if name is None or place.is_dir():
                 found.append(None if name is None else place / name)
             else:
-                found.append(picture(read(name), mode, f"{place}: {name}"))
+                found.append(decode(read(name), f"{place}: {name}"))
         return tuple(found)
 
     ids = [PurePosixPath(name).stem for name in names if name.startswith("qpos/")]
@@ -84,7 +84,7 @@ def load(path: Path) -> Recording:
         truth = se3.inverse(finite(told, f"{place}: {_TRUTH}", (4, 4)))
     folder = path if path.is_dir() else path.parent
     urdf, notes = urdf_beside(folder, "a Franka Panda")
-    images, masks = pictures("color", "RGB"), pictures("mask", "L")
+    images, masks = sources("color", pictures.image), sources("mask", _mask)
     return Recording(
         name="easyhec_" + (prefix.rstrip("/") or place.resolve().name),
         mounting=Mounting.EYE_TO_HAND,
@@ -105,6 +105,10 @@ def load(path: Path) -> Recording:
     )
 
 
+def _mask(content: bytes, where: str) -> Image:
+    return pictures.mask(content, where).astype(np.uint8) * np.uint8(255)
+
+
 def _names(place: Path, prefix: str) -> list[str]:
     if place.is_dir():
         found = [f"{kind}/{p.name}" for kind in ("qpos", "color", "mask") for p in (place / kind).glob("*.*")]
@@ -117,7 +121,7 @@ def _size(images: tuple[ImageSource, ...], place: Path) -> tuple[int, int]:
     first = next((image for image in images if image is not None), None)
     if first is None:
         raise InputError(f"{place}: color/ holds no picture for any qpos/")
-    return image_size(first) if isinstance(first, Path) else (first.shape[1], first.shape[0])
+    return pictures.size(first) if isinstance(first, Path) else (first.shape[1], first.shape[0])
 
 
 @hookimpl

@@ -12,14 +12,14 @@ from typing import Any
 
 import numpy as np
 
-from hecbench import se3
+from hecbench import pictures, se3
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
 from hecbench.registry import hookimpl
 from hecbench.specs import DatasetSpec
 from hecbench.targets import Target
 from hecbench_datasets.reading.hints import circle_grid, hinted_target, hints_for
-from hecbench_datasets.reading.sources import Array, finite, foreign, head, image_size, item, yaml_value
+from hecbench_datasets.reading.sources import Array, finite, foreign, head, item, yaml_value
 
 _NAMES = ("cal_data.yaml", "data.yaml")
 _QUATERNION = ("x", "y", "z", "qx", "qy", "qz", "qw")
@@ -73,7 +73,7 @@ def _pose(values: Any, file: Path) -> Array:
 
 def _camera(content: Any, file: Path, image: Path) -> CameraModel:
     intrinsics = content.get("intrinsics")
-    size = image_size(image)
+    size = pictures.size(image)
     if intrinsics is None:
         return CameraModel(*size)
     fx, fy, cx, cy = finite([item(intrinsics, key, file) for key in ("fx", "fy", "cx", "cy")], str(file))

@@ -20,7 +20,7 @@ _EXTRAS = {
     "parquet": ("pyarrow",),
     "cluster": ("distributed",),
 }
-_REQUIRED = ("numpy", "scipy", "numba", "opencv-contrib-python-headless", "airo-models", "pupil-apriltags")
+_REQUIRED = ("numpy", "scipy", "numba", "opencv-contrib-python-headless", "airo-models")
 _OPENCV_CURE = "pip install 'opencv-contrib-python-headless<5' (version 5 has no calibrateHandEye)"
 
 
@@ -41,14 +41,14 @@ class Finding:
 def examine() -> list[Finding]:
     """Python, required packages, OpenCV's functions, optional extras and plugins that are not ready."""
     python = sys.version_info
-    supported = (3, 11) <= python[:2] <= (3, 12)
+    supported = python[:2] >= (3, 11)
     return [
         Finding("hecbench", "ok", __version__),
         Finding(
             "python",
             "ok" if supported else "broken",
             f"{python.major}.{python.minor}.{python.micro}",
-            "" if supported else "use Python 3.11 or 3.12",
+            "" if supported else "use Python 3.11 or newer",
         ),
         *(_package(name) for name in _REQUIRED),
         _opencv_functions(),

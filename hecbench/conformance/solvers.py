@@ -1,5 +1,4 @@
-"""The checks that every solver passes, ours and a stranger's: each is a law that holds for any correct
-method.
+"""The checks that every solver of marker recordings passes: each is a law that holds for any correct method.
 
 A check of a solver on exact data passes when the answer is right or the solver refuses; refusing too often
 fails.
@@ -9,7 +8,7 @@ from __future__ import annotations
 
 import random
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
@@ -20,7 +19,7 @@ from hecbench import se3
 from hecbench.errors import Refusal, SolverFailure
 from hecbench.estimate import Estimate
 from hecbench.recording import CameraModel, Mounting, Recording
-from hecbench.specs import Need, Solver, SolverSpec
+from hecbench.specs import Need, Solver
 from hecbench.targets import ChessboardTarget
 
 Array = NDArray[np.float64]
@@ -34,37 +33,7 @@ _RIGS = 5
 _TARGET = ChessboardTarget(6, 5, 0.03)
 _K = np.array([[1200.0, 0, 639.5], [0, 1200.0, 479.5], [0, 0, 1]])
 _CAMERA = CameraModel(1280, 960, _K)
-_SUPPORTED = frozenset({Need.TARGET_POSES, Need.CORNERS, Need.INTRINSICS, Need.INITIAL})
-
-
-@dataclass(frozen=True)
-class Check:
-    """The outcome of one check: passed, failed, or not applicable to what the solver needs."""
-
-    name: str
-    passed: bool
-    detail: str = ""
-
-
-def check_solver(spec: SolverSpec) -> list[Check]:
-    """Run every check on a solver of marker recordings.
-
-    Raises:
-        Refusal: the solver needs what these generated recordings do not have (images, masks, a robot model).
-    """
-    beyond = sorted(spec.needs - _SUPPORTED)
-    if beyond:
-        raise Refusal(f"{spec.name} needs {', '.join(beyond)}, which the conformance recordings do not have")
-    solver = spec.factory()
-    return [Check(name, *_outcome(check, solver)) for name, check in _CHECKS.items()]
-
-
-def _outcome(check: Callable[[Solver], Iterator[str]], solver: Solver) -> tuple[bool, str]:
-    try:
-        faults = list(check(solver))
-    except Exception as error:  # a crash is a fault like any other
-        return False, f"crashed with {type(error).__name__}: {error}"
-    return not faults, faults[0] if faults else ""
+SUPPORTED = frozenset({Need.TARGET_POSES, Need.CORNERS, Need.INTRINSICS, Need.INITIAL})
 
 
 def rig(
@@ -108,7 +77,7 @@ def rig(
     )
 
 
-def _answer(solver: Solver, recording: Recording) -> Estimate | str:
+def answer(solver: Solver, recording: Recording) -> Estimate | str:
     """The estimate, or why there is none."""
     try:
         return solver(recording.without_truth(), rng=np.random.default_rng(0))
@@ -116,8 +85,8 @@ def _answer(solver: Solver, recording: Recording) -> Estimate | str:
         return str(error)
 
 
-def _difference(first: Array | None, second: Array | None) -> float:
-    """The larger of the distances in m and in rad."""
+def difference(first: Array | None, second: Array | None) -> float:
+    """The larger of the distances of two poses (4, 4) in m and in rad."""
     assert first is not None
     assert second is not None
     return max(float(se3.translation_error_m(first, second)), float(se3.rotation_error_rad(first, second)))
@@ -127,11 +96,11 @@ def _exact(mounting: Mounting) -> Callable[[Solver], Iterator[str]]:
     def check(solver: Solver) -> Iterator[str]:
         for seed in range(_RIGS):
             recording = rig(np.random.default_rng(seed), mounting)
-            found = _answer(solver, recording)
+            found = answer(solver, recording)
             if isinstance(found, str):
                 yield f"exact data of rig {seed} is refused: {found}"
                 continue
-            error = _difference(found.parent_T_camera, recording.truth_parent_T_camera)
+            error = difference(found.parent_T_camera, recording.truth_parent_T_camera)
             if not error <= TOLERANCE:
                 yield f"exact data of rig {seed}: off by {error:.3g} m or rad, allowed is {TOLERANCE:g}"
 
@@ -151,14 +120,14 @@ def _same_on(
         for seed in range(_RIGS):
             for mounting in Mounting:
                 recording = rig(np.random.default_rng(seed), mounting, noise=noise)
-                before, after = _answer(solver, recording), _answer(solver, change(recording))
+                before, after = answer(solver, recording), answer(solver, change(recording))
                 if isinstance(before, str) or isinstance(after, str):
                     if type(before) is not type(after):
                         reason = before if isinstance(before, str) else after
                         yield f"{mounting}, rig {seed}: answered once, refused once: {reason}"
                     continue
                 assert after.parent_T_camera is not None
-                error = _difference(undo(after.parent_T_camera), before.parent_T_camera)
+                error = difference(undo(after.parent_T_camera), before.parent_T_camera)
                 if not error <= tolerance:
                     yield f"{mounting}, rig {seed}: the answers differ by {error:.3g} m or rad"
 
@@ -215,24 +184,25 @@ def _degenerate_is_refused(solver: Solver) -> Iterator[str]:
         "one rotation axis, half turns": np.repeat([0.0, np.pi], 6)[:, None] * axis,
     }
     for (name, rotations), mounting, noise in product(cases.items(), Mounting, (0.0, 1e-3)):
-        found = _answer(solver, rig(np.random.default_rng(2), mounting, noise=noise, rotations=rotations))
+        found = answer(solver, rig(np.random.default_rng(2), mounting, noise=noise, rotations=rotations))
         if not isinstance(found, str):
             yield f"{name}, {mounting}, noise {noise:g}: answered instead of refused"
 
 
 def _leaves_the_world_alone(solver: Solver) -> Iterator[str]:
     recording = rig(np.random.default_rng(3), Mounting.EYE_TO_HAND, noise=1e-3)
-    digest, states = recording.without_truth().sha256, _global_states()
+    digest, states = recording.without_truth().sha256, global_states()
     blind = recording.without_truth()
     for _ in range(2):
         solver(blind, rng=np.random.default_rng(0))
-    if _global_states() != states:
+    if global_states() != states:
         yield "a global random generator was used; use the one that is passed"
     if replace(blind).sha256 != digest:
         yield "the recording was changed; copy an array before writing to it"
 
 
-def _global_states() -> tuple[object, str]:
+def global_states() -> tuple[object, str]:
+    """States of the global random generators, which a plugin must not use."""
     return random.getstate(), repr(np.random.get_state())  # noqa: NPY002 - checked, not used
 
 
@@ -244,7 +214,7 @@ def _undo_move(parent_T_camera: Array) -> Array:
     return np.asarray(se3.inverse(_MOVE) @ parent_T_camera)
 
 
-_CHECKS: dict[str, Callable[[Solver], Iterator[str]]] = {
+CHECKS: dict[str, Callable[[Solver], Iterator[str]]] = {
     "exact, eye_to_hand": _exact(Mounting.EYE_TO_HAND),
     "exact, eye_in_hand": _exact(Mounting.EYE_IN_HAND),
     "order of samples": _same_on(_reversed, _identity, noise=1e-3, tolerance=NOISY_TOLERANCE),

@@ -30,13 +30,15 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
         "blurred": [],
         "repeated": [],
     }
+    reasons: list[str] = []
     sharpness: dict[int, float] = {}
     seen: dict[bytes, int] = {}
     for i in indices:
         try:
             grey = recording.image(i).mean(2)
-        except (InputError, OSError):
+        except (InputError, OSError) as error:
             faults["unreadable"].append(i)
+            reasons.append(str(error))
             continue
         if max((grey < _DARK).mean(), (grey > _BRIGHT).mean()) > _MOST_CLIPPED:
             faults["dark or overexposed"].append(i)
@@ -51,6 +53,7 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
     if not found:
         return Finding(ID, Severity.OK, f"{len(indices)} images are readable, exposed and sharp"), case
     summary = "; ".join(f"{kind}: {names(which)}" for kind, which in found.items())
+    summary += f" ({reasons[0]})" if reasons else ""
     concerned = tuple(dict.fromkeys(sample for which in found.values() for sample in which))
     return Finding(ID, Severity.WARNING, summary, _CURE, float(len(concerned)), 0.0, concerned), case
 

@@ -8,9 +8,11 @@ from pathlib import Path
 
 import numpy as np
 
+from hecbench import pictures
 from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity
 from hecbench.diagnose.fit import EXPLAINS, Fit
+from hecbench.errors import InputError
 from hecbench.recording import CameraModel, Recording
 
 ID = "intrinsics"
@@ -78,15 +80,12 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
 
 def _image_size(recording: Recording) -> tuple[int, int] | None:
     """Width and height of the first image file, without decoding it."""
-    from PIL import Image
-
     first = next((source for source in recording.images or () if isinstance(source, Path)), None)
     if first is None:
         return None
     try:
-        with Image.open(first) as picture:
-            return picture.size
-    except (OSError, SyntaxError, ValueError):  # damaged or absent: image_quality says so
+        return pictures.size(first)
+    except InputError:  # damaged or absent: image_quality says so
         return None
 
 

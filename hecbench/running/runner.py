@@ -9,12 +9,12 @@ from pathlib import Path
 
 import numpy as np
 
-from hecbench import diagnose, registry
+from hecbench import diagnose, registry, threads
 from hecbench.errors import InputError
 from hecbench.estimate import Estimate
 from hecbench.preparation import load_recording, prepare, segmented
 from hecbench.recording import Recording
-from hecbench.running.solving import Options, provenance, solve_prepared
+from hecbench.running.solving import Options, each_solved, provenance
 from hecbench.specs import Kind, SolverSpec, SuiteSpec
 from hecbench.storage import evidence, store
 from hecbench.storage.evidence import Evidence
@@ -63,7 +63,7 @@ def execute(task: Task, options: Options) -> tuple[list[Estimate], Evidence | No
     origin = provenance(recording, options) | ({"facts": dict(facts)} if facts else {})
     estimates = [
         replace(estimate, suite=task.suite or "files", level=task.level, item=task.item)
-        for estimate in solve_prepared(prepared, specs, options, origin)
+        for estimate in each_solved(prepared, specs, options, origin)
     ]
     return estimates, None if task.path is None else _examined(recording, ready)
 
@@ -128,7 +128,13 @@ def _executed(
 
     with _backend(executor):
         parallel = Parallel(n_jobs=jobs if executor is None else -1, return_as="generator_unordered")
-        yield from parallel(delayed(execute)(task, options) for task in tasks)
+        yield from parallel(delayed(_execute_alone)(task, options) for task in tasks)
+
+
+def _execute_alone(task: Task, options: Options) -> tuple[list[Estimate], Evidence | None]:
+    """One of several worker processes, which have the cores between them: a thread each."""
+    threads.limit(1)
+    return execute(task, options)
 
 
 @contextmanager

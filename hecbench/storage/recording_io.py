@@ -12,10 +12,10 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import files
+from hecbench import files, pictures
 from hecbench.errors import InputError
 from hecbench.estimate import plain
-from hecbench.recording import CameraModel, ImageSource, Mounting, Recording, RobotDescription
+from hecbench.recording import OPENCV, CameraModel, ImageSource, Mounting, Recording, RobotDescription
 from hecbench.robots import urdf_files
 from hecbench.targets import AprilTagTarget, CharucoTarget, ChessboardTarget, PointsTarget, Target
 
@@ -44,6 +44,7 @@ class _Camera(_Strict):
     height: Count
     K: Matrix | None = None
     distortion: list[float] | None = None
+    distortion_model: str = OPENCV
 
 
 class _Points(_Strict, tag_field="kind", tag="points"):
@@ -112,12 +113,13 @@ def is_recording(path: Path) -> bool:
     return (path / FILE_NAME).is_file() or (path.is_file() and path.name == FILE_NAME)
 
 
-def load(path: Path) -> Recording:
+def load(path: str | Path) -> Recording:
     """Read a recording folder (or its JSON file). No image is decoded, and images may be absent.
 
     Raises:
         InputError: with the file, the key, the value and the cure.
     """
+    path = Path(path)
     file = path if path.name == FILE_NAME and not path.is_dir() else path / FILE_NAME
     content = files.read_bytes(file)
     try:
@@ -171,7 +173,8 @@ def _camera(parsed: _Camera | None) -> CameraModel | None:
     if parsed is None:
         return None
     K = _optional_array("camera.K", parsed.K)
-    return CameraModel(parsed.width, parsed.height, K, np.array(parsed.distortion or [], float))
+    distortion = np.array(parsed.distortion or [], float)
+    return CameraModel(parsed.width, parsed.height, K, distortion, parsed.distortion_model)
 
 
 def _target(parsed: _Points | _Chessboard | _Charuco | _AprilTag | None) -> Target | None:
@@ -263,11 +266,12 @@ def _inside(folder: Path, key: str, name: str) -> Path:
     return path
 
 
-def save(recording: Recording, folder: Path) -> None:
+def save(recording: Recording, folder: str | Path) -> None:
     """Write a recording folder; images and masks in memory or elsewhere are stored as PNG or copied in.
 
     The JSON file is written last and atomically, so a folder with `recording.json` is complete.
     """
+    folder = Path(folder)
     images = _store_pictures(recording.images, folder, "images", recording.sample_ids)
     masks = _store_pictures(recording.masks, folder, "masks", recording.sample_ids)
     samples = [
@@ -288,6 +292,7 @@ def save(recording: Recording, folder: Path) -> None:
         "height": recording.camera.height,
         "K": recording.camera.K,
         "distortion": recording.camera.distortion,
+        "distortion_model": recording.camera.distortion_model,
     }
     content = {
         "schema": SCHEMA,
@@ -339,7 +344,9 @@ def _store_pictures(
             names.append(None)
         elif isinstance(source, np.ndarray):
             name = _free_name(kind, f"{files.safe_name(sample_id)}.png", taken)
-            files.write_bytes(folder / name, encode_png(source))
+            where = f"samples[{len(names)}].{kind.removesuffix('s')}"
+            picture = pictures.image(source, where) if kind == "images" else _mask_picture(source, where)
+            files.write_bytes(folder / name, encode_png(picture))
             names.append(name)
         else:
             if source not in stored:
@@ -347,6 +354,10 @@ def _store_pictures(
                 files.write_bytes(folder / stored[source], files.read_bytes(source))
             names.append(stored[source])
     return names
+
+
+def _mask_picture(mask: NDArray[Any], where: str) -> NDArray[np.uint8]:
+    return pictures.mask(mask, where).astype(np.uint8) * np.uint8(255)
 
 
 def _free_name(kind: str, name: str, taken: set[str]) -> str:

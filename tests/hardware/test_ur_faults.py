@@ -88,17 +88,18 @@ def test_emergency_stop_must_be_released_first(robot, controller, monkeypatch):
     assert robot.recover(lambda line: True)
 
 
-@pytest.mark.parametrize("role", ["_control", "_stream"])
+@pytest.mark.parametrize("role", ["control", "stream"])
 def test_a_dead_worker_is_a_lost_link_and_stops_the_arm(robot, connect, role):
     watcher = connect()
-    assert moved_into(robot, lambda: os.kill(getattr(robot, role).pid, signal.SIGKILL)) is Fault.LINK_LOST
+    worker = robot._control.worker if role == "control" else robot._stream
+    assert moved_into(robot, lambda: os.kill(worker.pid, signal.SIGKILL)) is Fault.LINK_LOST
     assert np.abs(watcher.settle().joint_speeds_rad_s).max() == 0
 
 
 def test_a_hanging_client_is_ended_and_the_arm_stopped(robot, connect):
     """A stopped process answers as little as a library that hangs with the interpreter held."""
     watcher = connect()
-    assert moved_into(robot, lambda: os.kill(robot._control.pid, signal.SIGSTOP)) is Fault.LINK_LOST
+    assert moved_into(robot, lambda: os.kill(robot._control.worker.pid, signal.SIGSTOP)) is Fault.LINK_LOST
     assert np.abs(watcher.settle().joint_speeds_rad_s).max() == 0
     assert robot.recover(lambda line: True)
 

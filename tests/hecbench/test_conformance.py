@@ -7,13 +7,11 @@ import pytest
 
 from hecbench import conformance, registry, se3
 from hecbench.conformance import solvers
-from hecbench.errors import Refusal
+from hecbench.errors import InputError, Refusal
 from hecbench.estimate import Estimate
-from hecbench.specs import Kind, Need, SolverSpec
+from hecbench.specs import Kind, SolverSpec
 
-CHECKED = [
-    spec for spec in registry.load().ready(Kind.SOLVER, SolverSpec) if spec.needs <= solvers._SUPPORTED
-]
+CHECKED = [spec for spec in registry.load().ready(Kind.SOLVER, SolverSpec) if spec.needs <= solvers.SUPPORTED]
 
 
 @pytest.mark.parametrize("spec", CHECKED, ids=lambda spec: spec.name)
@@ -83,6 +81,72 @@ def test_faulty_solvers_are_caught(solver, caught):
     assert caught in failures(solver)
 
 
-def test_solvers_that_need_pictures_are_told_so():
-    with pytest.raises(Refusal, match="needs images"):
-        conformance.check_solver(replace(park(), needs=frozenset({Need.IMAGES})))
+OTHERS = (Kind.DATASET, Kind.EVALUATOR, Kind.EXPORTER, Kind.SEGMENTER, Kind.TRANSLATOR)
+
+
+@pytest.mark.parametrize(
+    "plugin",
+    [p for kind in OTHERS for p in registry.load().select(kind) if p.status is registry.PluginStatus.READY],
+    ids=lambda plugin: f"{plugin.kind}-{plugin.name}",
+)
+def test_plugins_of_other_kinds_conform(plugin):
+    checks = conformance.check_plugin(plugin.spec)
+    assert checks
+    assert [f"{check.name}: {check.detail}" for check in checks if not check.passed] == []
+
+
+def test_a_markerless_solver_conforms():
+    checks = conformance.check_solver(registry.load().named("render_gn"))
+    assert [f"{check.name}: {check.detail}" for check in checks if not check.passed] == []
+
+
+def markerless_failures(solver):
+    spec = replace(registry.load().named("render_gn"), factory=lambda: solver)
+    return {check.name for check in conformance.check_solver(spec) if not check.passed}
+
+
+def test_the_start_is_no_markerless_answer():
+    failed = markerless_failures(lambda recording, *, rng: Estimate(recording.initial_parent_T_camera))
+    assert failed == {"exact pictures", "no robot in the pictures"}
+
+
+def test_a_solver_that_reads_the_order_is_caught():
+    def first_view(recording, *, rng):
+        return Estimate(se3.make(np.eye(3), recording.joints_rad[0, :3]))
+
+    assert "order of samples" in markerless_failures(first_view)
+
+
+def others_failures(name, **changes):
+    spec = replace(registry.load().named(name, changes.pop("kind", None)), **changes)
+    return [check.detail for check in conformance.check_plugin(spec) if not check.passed]
+
+
+def test_faulty_plugins_of_other_kinds_are_caught():
+    def everywhere(recording):
+        return replace(
+            recording, masks=tuple(np.full((240, 320), 255, np.uint8) for _ in range(len(recording)))
+        )
+
+    def bright(image, mask, *, part, colours):
+        return np.full_like(image, 2.0)
+
+    def nan(estimate, recording, *, solve, rng):
+        return {"x": float("nan")}
+
+    assert "overlap" in others_failures("given", factory=lambda: everywhere)[0]
+    assert "[0, 1]" in others_failures("identity", factory=lambda: bright)[0]
+    assert "not a number" in others_failures("consistency", factory=lambda: nan)[0]
+    assert "recognises" in others_failures("native", sniff=lambda path: True)[0]
+    assert "wrote nothing" in others_failures("ros", write=lambda estimate, options: "")[0]
+
+
+def test_kinds_without_checks_are_refused():
+    with pytest.raises(Refusal, match="no checks for a gripper"):
+        conformance.check_plugin(registry.load().named("none"))
+
+
+def test_a_name_of_two_kinds_must_be_told_apart():
+    with pytest.raises(InputError, match="--kind"):
+        registry.load().named("easyhec")
+    assert registry.load().named("easyhec", "dataset").kind is Kind.DATASET

@@ -51,3 +51,21 @@ def test_ranks_are_shared_where_intervals_overlap():
     intervals = [Interval(1, 0.8, 1.2), Interval(1.1, 0.9, 1.3), Interval(5, 4, 6), Interval(4.5, 3, 9)]
     assert statistics.shared_ranks(intervals) == [1, 1, 3, 3]
     assert statistics.shared_ranks([Interval(2, np.nan, np.nan), Interval(1, np.nan, np.nan)]) == [2, 1]
+
+
+def test_intervals_do_not_depend_on_the_order_of_the_values():
+    rng = np.random.default_rng(1)
+    values, clusters = rng.normal(0, 1, 40), np.repeat(np.arange(10), 4)
+    order = rng.permutation(40)
+    assert statistics.bootstrap(values, np.median) == statistics.bootstrap(values[order], np.median)
+    first = statistics.cluster_bootstrap(values, clusters)
+    assert first == statistics.cluster_bootstrap(values[order], clusters[order])
+
+
+@pytest.mark.parametrize("count", [1, 2, 4])
+def test_fewer_than_five_values_have_no_interval(count):
+    values = np.arange(count, dtype=float)
+    assert np.isnan(statistics.bootstrap(values).low)
+    assert np.isnan(statistics.cluster_bootstrap(np.repeat(values, 3), np.repeat(np.arange(count), 3)).high)
+    five = statistics.bootstrap(np.arange(5.0))
+    assert five.low < five.value < five.high

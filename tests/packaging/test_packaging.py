@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from hecbench import __version__
+
 ROOT = Path(__file__).resolve().parents[2]
 TOY = ROOT / "tests" / "third_party" / "toy_calibrator"
 PACKAGES = ("hecbench", "hecbench_plugins", "hecbench_hardware", "hecbench_datasets")
@@ -28,7 +30,7 @@ def wheel(tmp_path_factory):
 
 def test_wheel_holds_the_four_packages_and_nothing_else(wheel):
     names = zipfile.ZipFile(wheel).namelist()
-    assert {name.split("/")[0] for name in names} == {*PACKAGES, "hecbench-0.1.0.dist-info"}
+    assert {name.split("/")[0] for name in names} == {*PACKAGES, f"hecbench-{__version__}.dist-info"}
     assert {f"{package}/py.typed" for package in PACKAGES} <= set(names)
     assert "hecbench/report/templates/report.html.j2" in names
     assert not [name for name in names if "__pycache__" in name or name.startswith("tests")]

@@ -195,28 +195,6 @@ def item(mapping: Any, key: str, source: Path | str) -> Any:
     return mapping[key]
 
 
-def image_size(path: Path) -> tuple[int, int]:
-    """Width and height in px from an image's header, without decoding it."""
-    from PIL import Image
-
-    try:
-        with Image.open(path) as picture:
-            return picture.size
-    except (OSError, SyntaxError, ValueError) as error:
-        raise InputError(f"{path}: cannot be read as an image ({error}); restore the file") from error
-
-
-def picture(content: bytes, mode: str, source: str) -> NDArray[np.uint8]:
-    """Decode image bytes, (height, width, 3) for "RGB" or (height, width) for "L"."""
-    from PIL import Image
-
-    try:
-        with Image.open(io.BytesIO(content)) as opened:
-            return np.asarray(opened.convert(mode))
-    except (OSError, SyntaxError, ValueError) as error:
-        raise InputError(f"{source}: cannot be read as an image ({error}); restore the file") from error
-
-
 def zip_names(path: Path) -> list[str]:
     """Names of the files in an archive; none when it is not a readable one."""
     try:

@@ -7,8 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import numpy as np
-
+from hecbench import pictures
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel
 from hecbench.registry import hookimpl
@@ -41,16 +40,13 @@ class ImageFolder:
 
     def grab(self, timeout_s: float = 2.0) -> Frame:
         """The next image as RGB."""
-        from PIL import Image, UnidentifiedImageError
-
         if self._next >= len(self._files) and not self.loop:
             raise DeviceFault(Fault.CAMERA, self.name, f"all {len(self._files)} images are used")
         path = self._files[self._next % len(self._files)]
         try:
-            with Image.open(path) as picture:
-                image = np.asarray(picture.convert("RGB"), np.uint8)
-        except (OSError, UnidentifiedImageError):
-            raise DeviceFault(Fault.CAMERA, self.name, f"{path.name} is not a readable image") from None
+            image = pictures.image(path, path.name)
+        except InputError as error:
+            raise DeviceFault(Fault.CAMERA, self.name, str(error)) from None
         self._next += 1
         return Frame(image, time.time(), None, path.name)
 

@@ -34,7 +34,7 @@ def hecbench_observers() -> Iterable[ObserverSpec]:
     yield ObserverSpec(
         name="corners_from_images",
         summary="AprilTag, chessboard, ChArUco or circle grid, detected; unknown intrinsics calibrated",
-        imports=("cv2", "pupil_apriltags"),
+        imports=("cv2",),
         gives=Need.CORNERS,
         applies=lambda recording: (
             recording.corners_px is None

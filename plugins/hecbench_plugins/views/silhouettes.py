@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.errors import InputError, Refusal
+from hecbench.lens import undistort
 from hecbench.recording import CameraModel, Recording
 from hecbench.rendering import Renderer
-from hecbench.rendering.undistort import distort, shrunk_intrinsics
+from hecbench.rendering.undistort import shrunk_intrinsics
 from hecbench_plugins.views.pyramid import meshes_by_level, photographed_robot
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-_UNDISTORT_ROUNDS = 20
-_UNDISTORT_PX = 0.05
 _WIDEST = 3.0
 """Largest side of the drawn canvas over that of the image."""
 
@@ -63,29 +62,10 @@ class Silhouettes:
         return np.asarray(np.logical_or.reduce([self.draw(sample, start) for start in starts]))
 
 
-@dataclass(frozen=True)
-class Uncertainty:
-    """How far off a start may be: its camera centre, and its rotation."""
-
-    centre_m: float = 0.1
-    rotation_deg: float = 10.0
-    draws: int = 30
-
-    def around(self, start: Array) -> list[Array]:
-        """The start, then others (4, 4) exactly that far off in random directions, the same at every call."""
-        rng = np.random.default_rng(0)
-        found = [start]
-        for _ in range(self.draws):
-            axis, way = (v / np.linalg.norm(v) for v in rng.normal(size=(2, 3)))
-            turned = start[:3, :3] @ se3.so3_exp(np.deg2rad(self.rotation_deg) * axis)
-            found.append(se3.make(turned, start[:3, 3] + self.centre_m * way))
-        return found
-
-
 def _shrunk(camera: CameraModel, shrink: int) -> CameraModel:
     assert camera.K is not None
     K = shrunk_intrinsics(camera.K, 1 / shrink)
-    return CameraModel(camera.width // shrink, camera.height // shrink, K, camera.distortion)
+    return replace(camera, width=camera.width // shrink, height=camera.height // shrink, K=K)
 
 
 def _canvas(camera: CameraModel) -> tuple[tuple[NDArray[np.intp], NDArray[np.intp]] | None, Array, int, int]:
@@ -96,11 +76,12 @@ def _canvas(camera: CameraModel) -> tuple[tuple[NDArray[np.intp], NDArray[np.int
     """
     assert camera.K is not None
     width, height = camera.width, camera.height
-    if not camera.distortion.any():
+    if camera.is_pinhole:
         return None, camera.K, width, height
     v, u = np.mgrid[0:height, 0:width].astype(float)
     rays = np.stack([u, v, np.ones_like(u)], -1) @ np.linalg.inv(camera.K).T
-    ideal = _undistorted(rays[..., :2], camera) @ camera.K[:2, :2].T + camera.K[:2, 2]
+    ideal = undistort(rays[..., :2], camera) @ camera.K[:2, :2].T + camera.K[:2, 2]
+    ideal = np.nan_to_num(ideal, nan=np.inf)
     size = np.array([width, height])
     margin = (_WIDEST - 1) / 2 * size
     low = np.floor(np.maximum(ideal.min((0, 1)), -margin)).astype(int)
@@ -109,14 +90,3 @@ def _canvas(camera: CameraModel) -> tuple[tuple[NDArray[np.intp], NDArray[np.int
     K = camera.K.copy()
     K[:2, 2] -= low
     return (place[..., 1], place[..., 0]), K, int(high[0] - low[0] + 1), int(high[1] - low[1] + 1)
-
-
-def _undistorted(points: Array, camera: CameraModel) -> Array:
-    """Ideal normalised coordinates of distorted ones, by fixed-point steps; where these diverge, off the canvas."""
-    assert camera.K is not None
-    found = points.copy()
-    for _ in range(_UNDISTORT_ROUNDS):
-        found -= distort(found, camera.distortion) - points
-    off_px = np.abs(distort(found, camera.distortion) - points).max(-1) * camera.K[0, 0]
-    found[~(off_px < _UNDISTORT_PX)] = np.inf
-    return found

@@ -1,0 +1,264 @@
+"""Robot poses or joints beside pictures: the target is found in the pictures first, to prove the convention."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from hecbench import pictures, preparation, se3
+from hecbench.errors import InputError
+from hecbench.exchange.conventions import HINTS_NAME, Proof, prove
+from hecbench.exchange.pose_numbers import Reading, readings
+from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
+from hecbench_datasets.reading.cameras import camera_in
+from hecbench_datasets.reading.columns import Columns, Poses
+from hecbench_datasets.reading.hints import Hints, hinted_target
+from hecbench_datasets.reading.joint_poses import JointReading, joint_readings
+from hecbench_datasets.reading.seen_targets import seen_target
+from hecbench_datasets.reading.sources import Array, natural
+from hecbench_datasets.reading.survey import Survey
+
+_MOST_LOOKED_AT = 3
+"""Readings under which the pictures are searched again."""
+
+
+@dataclass(frozen=True)
+class Beside:
+    """Rows of one stream and their pictures."""
+
+    stream: Columns
+    poses: Poses | None
+    rows: list[int]
+    images: list[Path]
+
+
+def load_beside_pictures(
+    found: Survey, stream: Columns, poses: Poses | None, hints: Hints, file: Path
+) -> Recording:
+    """The recording of a stream and the folder's pictures, its convention proven by the target seen in them.
+
+    Args:
+        found: the folder's files.
+        stream: with robot poses or joints.
+        poses: the robot's, None when it has joints.
+        hints: of the user, and the file where they stand or would stand.
+
+    Raises:
+        InputError: the pictures do not pair with the rows, the target is not told, or no reading is proven.
+    """
+    beside = _paired(found, stream, poses, hints)
+    camera, notes = _camera(found, beside.images[0], hints)
+    target = hinted_target(hints, file)
+    robots = _robots(found, hints)
+    told = hints.mounting is not None and (hints.robot_rotation is not None or _is_matrix(poses))
+    if target is None and not told:
+        raise InputError(
+            f"{found.path}: {len(beside.images)} pictures beside {stream.source} ({stream.found}); "
+            f"{seen_target(beside.images)} into {file}"
+        )
+    ways = _ways(beside, hints, robots)
+    recording = Recording(
+        name=found.path.resolve().name,
+        mounting=hints.mounting or Mounting.EYE_TO_HAND,
+        sample_ids=_ids(beside.images, found.path),
+        camera=camera,
+        target=target,
+        joints_rad=np.zeros((len(beside.images), 1)),
+        images=tuple(beside.images),
+        folder=found.path if found.path.is_dir() else found.path.parent,
+    )
+    if target is None or (told and len(ways) == 1):
+        way, mounting = ways[0], recording.mounting
+        notes.append(f"{found.path}: read as {mounting}, {way.reading.text}, as told")
+    else:
+        proof = _proven(found.path, ways, recording, hints)
+        way = next(way for way in ways if way.reading.text == proof.robot_text)
+        mounting = proof.mounting
+        notes.append(proof.note)
+    return replace(
+        recording,
+        mounting=mounting,
+        robot=way.robot,
+        base_T_flange=None if way.robot and way.robot.source else way.reading.poses,
+        joints_rad=way.joints_rad,
+        notes=tuple(notes),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Way:
+    reading: Reading
+    robot: RobotDescription | None = None
+    joints_rad: Array | None = None
+
+
+def _ways(beside: Beside, hints: Hints, robots: Sequence[str | Path]) -> list[_Way]:
+    """Every reading of the robot's rows."""
+    if beside.poses is None:
+        assert beside.stream.joints is not None
+        joints = beside.stream.joints[beside.rows]
+        found: list[JointReading] = joint_readings(joints, beside.stream.joint_names, robots)
+        return [_Way(one.reading, one.robot, one.joints_rad) for one in found]
+    return [
+        _Way(reading)
+        for reading in readings(
+            beside.poses.numbers[beside.rows],
+            ("base", "flange"),
+            rotation=hints.robot_rotation,
+            assumed_rotation=beside.poses.rotations or None,
+            unit=hints.robot_unit or beside.poses.unit,
+            inverted=None if hints.robot_pose is None else hints.robot_pose == "flange_T_base",
+        )
+    ]
+
+
+def _proven(path: Path, ways: Sequence[_Way], recording: Recording, hints: Hints) -> Proof:
+    """The reading that holds the target still in the pictures that show it.
+
+    A board that looks the same from two ends is turned as the robot's motion demands, so the pictures are looked at
+    again under the readings that the angles allow.
+    """
+    seen = preparation.prepare(recording)
+    try:
+        return _held_still(path, ways, seen, hints)
+    except InputError as as_first_seen:
+        if seen.camera_T_target is None:
+            raise
+        for way in _by_angles(ways, seen.camera_T_target)[:_MOST_LOOKED_AT]:
+            turned = preparation.prepare(replace(recording, base_T_flange=way.reading.poses))
+            try:
+                return _held_still(path, ways, turned, hints)
+            except InputError:
+                continue
+        raise as_first_seen
+
+
+def _held_still(path: Path, ways: Sequence[_Way], seen: Recording, hints: Hints) -> Proof:
+    if seen.camera_T_target is None:
+        raise InputError(
+            f"{path}: {'; '.join(seen.notes) or 'the target is not seen'}; correct target in {HINTS_NAME}"
+        )
+    shown = np.asarray(np.isfinite(seen.camera_T_target).all((1, 2)))
+    robot = [replace(way.reading, poses=way.reading.poses[shown]) for way in ways]
+    target = [Reading(seen.camera_T_target[shown], "camera_T_target seen")]
+    mountings = [hints.mounting] if hints.mounting else list(Mounting)
+    proof = prove(str(path), robot, target, mountings, hints.mounting is not None)
+    return replace(proof, note=f"{proof.note} (target seen in {shown.sum()} of {len(shown)} pictures)")
+
+
+def _by_angles(ways: Sequence[_Way], camera_T_target: Array) -> list[_Way]:
+    """One reading of each set of angles, those first that the target turns by, whichever end it is read from."""
+    shown = np.flatnonzero(np.isfinite(camera_T_target).all((1, 2)))
+    before, after = shown[:-1], shown[1:]
+    quarters = se3.so3_exp(np.outer(np.arange(4) * np.pi / 2, [0, 0, 1]))
+    relative = np.swapaxes(camera_T_target[before, :3, :3], 1, 2) @ camera_T_target[after, :3, :3]
+    seen = se3.rotation_angle(relative[:, None] @ quarters)
+    angles = [se3.rotation_error_rad(way.reading.poses[before], way.reading.poses[after]) for way in ways]
+    gaps = [float(np.abs(seen - turned[:, None]).min(1).mean()) for turned in angles]
+    kept: list[int] = []
+    for i in np.argsort(gaps, kind="stable"):
+        if not any(np.allclose(angles[i], angles[k], atol=1e-6) for k in kept):
+            kept.append(int(i))
+    return [ways[i] for i in kept]
+
+
+def _paired(found: Survey, stream: Columns, poses: Poses | None, hints: Hints) -> Beside:
+    """Rows and pictures, by the column of names, by equal counts, or by the numbers in the names."""
+    rows = poses.numbers if poses is not None else stream.joints
+    assert rows is not None
+    count = len(rows)
+    folders = {
+        folder: files
+        for folder, files in found.pictures.items()
+        if hints.images in (None, _relative(folder, found.path))
+    }
+    if stream.images is not None:
+        return Beside(
+            stream, poses, *_by_name(stream, [file for files in folders.values() for file in files])
+        )
+    fitting = [files for files in folders.values() if len(files) == count]
+    every = sorted(
+        (file for files in folders.values() for file in files),
+        key=lambda f: natural(f.relative_to(found.path)),
+    )
+    if not fitting and len(every) == count:
+        fitting = [
+            sorted(every, key=lambda file: [natural(part) for part in file.relative_to(found.path).parts])
+        ]
+    if len(fitting) == 1:
+        return Beside(stream, poses, list(range(count)), fitting[0])
+    if len(fitting) > 1:
+        names = " and ".join(_relative(files[0].parent, found.path) for files in fitting[:3])
+        raise InputError(
+            f"{found.path}: {names} both hold {count} pictures, two for one pose; write 'images: "
+            f"{_relative(fitting[0][0].parent, found.path)}' into {HINTS_NAME}"
+        )
+    shown = " and ".join(
+        f"{len(files)} pictures" + (f" in {_relative(folder, found.path)}" if len(folders) > 1 else "")
+        for folder, files in folders.items()
+    )
+    raise InputError(
+        f"{found.path}: {shown or 'no pictures'} for {count} rows of {Path(stream.source).name}; pair them up, or add "
+        "a column with the pictures' names"
+    )
+
+
+def _by_name(stream: Columns, pictures: list[Path]) -> tuple[list[int], list[Path]]:
+    rows, images = [], []
+    for row, name in enumerate(stream.images or ()):
+        wanted = name.replace("\\", "/").lstrip("./")
+        same = [file for file in pictures if file.as_posix().endswith(f"/{wanted}")]
+        same = same or [file for file in pictures if file.name == Path(wanted).name]
+        if len(same) > 1:
+            raise InputError(
+                f"{stream.source}: row {row + 1}: '{name}' may be {same[0]} or {same[1]}; name its folder"
+            )
+        if same:
+            rows.append(row)
+            images.append(same[0])
+    if not rows:
+        raise InputError(f"{stream.source}: none of the pictures that it names is there; put them beside it")
+    twice = {image for image in images if images.count(image) > 1}
+    if twice:
+        raise InputError(
+            f"{stream.source}: {min(twice).name} stands in several rows, one picture for two poses; keep one"
+        )
+    return rows, images
+
+
+def _relative(folder: Path, path: Path) -> str:
+    return folder.relative_to(path).as_posix() if path.is_dir() else folder.name
+
+
+def _ids(images: Sequence[Path], path: Path) -> tuple[str, ...]:
+    """The pictures' names, with their folders where names repeat."""
+    stems = [image.stem for image in images]
+    if len(set(stems)) == len(stems):
+        return tuple(stems)
+    return tuple(re.sub(r"[/\\]", "_", str(image.relative_to(path).with_suffix(""))) for image in images)
+
+
+def _camera(found: Survey, picture: Path, hints: Hints) -> tuple[CameraModel | None, list[str]]:
+    if hints.camera is not None:
+        return hints.camera_model(), []
+    folder = found.path if found.path.is_dir() else found.path.parent
+    camera = camera_in(found.files, picture)
+    if camera is None:
+        pictures.size(picture)
+        return None, []
+    return camera[0], [f"{folder}: intrinsics from {camera[1].name}"]
+
+
+def _robots(found: Survey, hints: Hints) -> list[str | Path]:
+    folder = found.path if found.path.is_dir() else found.path.parent
+    if hints.robot is not None:
+        return [folder / hints.robot if hints.robot.endswith(".urdf") else hints.robot]
+    return [file for file in found.files if file.suffix == ".urdf"]
+
+
+def _is_matrix(poses: Poses | None) -> bool:
+    return poses is not None and poses.numbers.shape[1] in (12, 16)
