@@ -39,6 +39,8 @@ EXIT_CODES = {"good": 0, "usable": 0, "doubtful": 1, "do_not_use": 3}
 )
 @choices.timeout
 @click.option("--out", type=choices.FOLDER, help="Default: out/<recording's name>.")
+@choices.threads
+@choices.no_cache
 @choices.seed
 @choices.as_json
 def calibrate(

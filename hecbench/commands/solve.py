@@ -33,6 +33,8 @@ if TYPE_CHECKING:
 @click.option(
     "--out", type=choices.FOLDER, help="Write each estimate to DIR/<solver>.json, for `report` and `export`."
 )
+@choices.threads
+@choices.no_cache
 @choices.seed
 @choices.as_json
 def solve(

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from hecbench import diagnose, registry
+from hecbench import diagnose, registry, threads
 from hecbench.errors import InputError
 from hecbench.estimate import Estimate
 from hecbench.preparation import load_recording, prepare, segmented
@@ -122,7 +122,13 @@ def _executed(
 
     with _backend(executor):
         parallel = Parallel(n_jobs=jobs if executor is None else -1, return_as="generator_unordered")
-        yield from parallel(delayed(execute)(task, options) for task in tasks)
+        yield from parallel(delayed(_execute_alone)(task, options) for task in tasks)
+
+
+def _execute_alone(task: Task, options: Options) -> tuple[list[Estimate], Evidence | None]:
+    """One of several worker processes, which have the cores between them: a thread each."""
+    threads.limit(1)
+    return execute(task, options)
 
 
 @contextmanager

@@ -97,10 +97,15 @@ def distance_m(first: Answer, second: Answer, points_m: Array) -> float:
 
 
 def agree(first: Answer, second: Answer, points_m: Array, tolerance_m: float) -> bool:
-    """Whether two answers are as near as their uncertainties allow, or as the user needs."""
+    """Whether two answers are as near as their uncertainties allow, or as the user needs.
+
+    A method that is very uncertain agrees with everything and confirms nothing, so that the reach of the more certain
+    one, or the user's tolerance, counts at most twice.
+    """
     known = [answer.rms_m for answer in (first, second) if np.isfinite(answer.rms_m)]
     allowed_m = max(_REACH * float(np.linalg.norm(known)), tolerance_m)
-    return distance_m(first, second, points_m) <= allowed_m
+    most_m = 2 * max(_REACH * min(known, default=0.0), tolerance_m)
+    return distance_m(first, second, points_m) <= min(allowed_m, most_m)
 
 
 def predicts_better(first: Estimate, second: Estimate, names: Sequence[str], seed: int = 0) -> bool:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench.estimate import Estimate, best_first, ordering_metric
-from hecbench.recording import Mounting, Recording
+from hecbench.recording import CameraModel, Mounting, Recording
 from hecbench.verdict import camera as cameras
 from hecbench.verdict import words
 from hecbench.verdict.answers import Answer, agree, answers_of, distance_m, predicts_better
@@ -56,7 +56,7 @@ def judge(
     moves = recording.mounting is Mounting.EYE_IN_HAND
     scales = Scales(points_in_parent(recording.base_T_flange, moves), tolerance_mm / 1e3)
     answers = answers_of(ordered, evidence, recording.camera, len(recording), scales.points_m)
-    best = _recommended(answers, scales)
+    best = _recommended(answers, scales, recording.camera)
     if best is None:
         return _without_answer(recording, ordered, findings, tolerance_mm)
     others = sorted(
@@ -66,10 +66,8 @@ def judge(
     near = [answer for answer in others if agree(best, answer, scales.points_m, scales.tolerance_m)]
     far = [answer for answer in others if answer not in near]
     expected, at = _expected(best, near, scales, at_m)
-    doubts = _doubts(best, near, far)
-    suspicion = cameras.suspicion(
-        [answer for answer in others if answer.moved_camera], best, recording.camera
-    )
+    suspicion = cameras.suspicion(answers, best, recording.camera)
+    doubts = _doubts(best, near, far) + ([suspicion] if suspicion else [])
     confirmed = [answer for answer in near if answer.sees_target != best.sees_target]
     grade, rule = graded(
         expected, tolerance_mm, findings, doubts, is_checked=best.sees_target or bool(confirmed)
@@ -92,14 +90,14 @@ def judge(
             Rival(a.solver, apart_mm(a), words.why_apart(a, best, metric, recording.camera, findings))
             for a in far
         ],
-        reasons=words.reasons(best, near, confirmed, doubts, suspicion, recording, apart_mm),
+        reasons=words.reasons(best, near, confirmed, doubts, recording, apart_mm),
         findings=findings,
         next=words.what_next(findings, expected, tolerance_mm, suspicion, len(recording)),
         estimates=ordered,
     )
 
 
-def _recommended(answers: Sequence[Answer], scales: Scales) -> Answer | None:
+def _recommended(answers: Sequence[Answer], scales: Scales, given: CameraModel | None) -> Answer | None:
     """The least expected error among methods that model their errors, unless another one predicts better.
 
     A method that changed the camera takes part only where that is earned. Without any method that models its errors it
@@ -118,7 +116,7 @@ def _recommended(answers: Sequence[Answer], scales: Scales) -> Answer | None:
             best = rival
             break
     for free in answers:
-        if free.moved_camera and cameras.earned(free, best):
+        if free.moved_camera and cameras.earned(free, best, given):
             return free
     return _confirmed(best, fixed, scales)
 

@@ -23,7 +23,6 @@ def reasons(
     near: Sequence[Answer],
     confirmed: Sequence[Answer],
     doubts: Sequence[str],
-    suspicion: str | None,
     recording: Recording,
     apart_mm: Callable[[Answer], float],
 ) -> list[str]:
@@ -47,8 +46,6 @@ def reasons(
     elif not doubts:
         said.append("no other method confirms it")
     said += doubts
-    if suspicion:
-        said.append(suspicion)
     if doubtful := best.estimate.diagnostics.get("doubtful_samples"):
         said.append(f"samples that disagree with the others: {', '.join(map(str, doubtful))}")
     return said

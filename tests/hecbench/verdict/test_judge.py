@@ -126,7 +126,10 @@ def freed(rig, gain, sigma_ratio, shift_mm=20.0):
 
 def test_a_changed_camera_must_be_earned(rig):
     fixed, free = freed(rig, gain=0.5, sigma_ratio=0.1)
-    assert judge(rig, fixed, free).recommended.solver == "bundle_intrinsics"
+    earned = judge(rig, fixed, free)
+    assert earned.recommended.solver == "bundle_intrinsics"
+    assert earned.grade is Grade.DOUBTFUL
+    assert judge(rig, fixed, freed(rig, 0.9, sigma_ratio=0.1)[1]).recommended.solver == "bundle"
     assert judge(rig, fixed, freed(rig, 0.5, sigma_ratio=0.9)[1]).recommended.solver == "bundle"
     found = judge(rig, fixed, freed(rig, 1.0, sigma_ratio=0.1)[1])
     assert found.recommended.solver == "bundle"
@@ -137,6 +140,7 @@ def test_a_changed_camera_must_be_earned(rig):
 def test_a_lens_that_seems_wrong_but_is_not_determined_is_named(rig):
     fixed, free = freed(rig, gain=0.5, sigma_ratio=0.9)
     found = judge(rig, fixed, free)
+    assert found.recommended.solver == "bundle"
     assert any("calibrate the lens again" in sentence for sentence in found.next)
 
 
