@@ -61,7 +61,7 @@ def calibrate(
     usable, 1 when it is doubtful, 3 when it is not to be used.
     """
     from hecbench import preparation
-    from hecbench.report import html
+    from hecbench.report import html, pictures
     from hecbench.running import calibrating, planning
 
     at_m = _place(at)
@@ -81,6 +81,8 @@ def calibrate(
         progress.writing()
         found = calibrating.judged(examined, specs, estimates, tolerance_mm, at_m)
         calibrating.Calibration(found, examined.evidence()).save(out)
+        if found.recommended is not None:
+            pictures.write(examined.segmented.recording, found.recommended, out)
         page = html.write(out).path
     if as_json:
         console.print_json(found.to_json())

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hecbench import files, verdict
+from hecbench import __version__, files, verdict
 from hecbench.errors import InputError
 from hecbench.estimate import Estimate, best_first
+from hecbench.report import pictures
 from hecbench.report.figures import figures
+from hecbench.report.first_screen import FirstScreen, first_screen
 from hecbench.report.recording_figures import agreement_figure, overlays, residual_figure, scene_figure
 from hecbench.report.section import Section
 from hecbench.report.studies import is_study
@@ -59,6 +61,7 @@ def write(folder: Path) -> Written:
         lambda sha256: evidence.load(folder, sha256),
         trials.trials,
         folder,
+        None if judged is None else first_screen(judged, pictures.load(folder)),
     )
     files.write_text(folder / FILE_NAME, text)
     return Written(folder / FILE_NAME, len(contents.estimates), len(trials.trials), damage)
@@ -71,9 +74,10 @@ def page(
     evidence: Callable[[str], Evidence | None],
     trials: Sequence[TrialRecord] = (),
     folder: Path | None = None,
+    first: FirstScreen | None = None,
 ) -> str:
     """The HTML text of a report on these estimates and trials; `evidence` gives what a run kept of a recording, by
-    hash; pictures of trials are in `folder`.
+    hash; pictures of trials are in `folder`; `first` comes before all.
     """
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
@@ -85,16 +89,21 @@ def page(
     sections.sort(key=lambda section: section.folded)
     return environment.get_template("report.html.j2").render(
         sections=sections,
+        first=first,
         damage=damage,
         command=command,
         runs=len(estimates),
         trials=len(trials),
         methods=len({trial.method for trial in trials}),
         recordings=len({e.provenance.get("recording_sha256") for e in estimates}),
-        solvers=sorted({e.solver for e in estimates}),
-        seeds=_values(estimates, "seed"),
-        versions=_values(estimates, "hecbench"),
-        libraries=_values(estimates, "versions"),
+        solvers={e.solver for e in estimates},
+        provenance=[
+            ("hecbench", _values(estimates, "hecbench") or [__version__]),
+            ("libraries", _values(estimates, "versions")),
+            ("seeds", _values(estimates, "seed")),
+            ("solvers", sorted({e.solver for e in estimates})),
+            ("trials", sorted({trial.method for trial in trials})),
+        ],
     )
 
 
