@@ -23,6 +23,7 @@ from hecbench.storage import evidence, results, store, trial_record
 from hecbench.storage.evidence import Evidence
 from hecbench.storage.results import VERDICT_NAME
 from hecbench.storage.trial_record import TrialRecord
+from hecbench.verdict import Verdict
 
 FILE_NAME = "report.html"
 
@@ -47,10 +48,7 @@ def write(folder: Path) -> Written:
     trials = trial_record.read(folder) if has_trials else trial_record.Contents([], [], [])
     judged = verdict.load(folder / VERDICT_NAME) if (folder / VERDICT_NAME).is_file() else None
     alone = has_trials and judged is None and not (folder / store.FILE_NAME).is_file()
-    if judged is not None:
-        contents = store.Contents(list(judged.estimates), [])
-    else:
-        contents = store.Contents([], []) if alone else results.read(folder)
+    contents = store.Contents([], []) if alone else _results(folder, judged)
     if not contents.estimates and not alone:
         raise InputError(f"{folder}: its store holds no whole result; run again with `hecbench run --resume`")
     damage = [*contents.damage, *trials.damage]
@@ -65,6 +63,14 @@ def write(folder: Path) -> Written:
     )
     files.write_text(folder / FILE_NAME, text)
     return Written(folder / FILE_NAME, len(contents.estimates), len(trials.trials), damage)
+
+
+def _results(folder: Path, judged: Verdict | None) -> store.Contents:
+    """The estimates of a verdict and those of a store beside it, or whatever a verb left in the folder."""
+    if judged is None:
+        return results.read(folder)
+    stored = store.read(folder) if (folder / store.FILE_NAME).is_file() else store.Contents([], [])
+    return store.Contents([*judged.estimates, *stored.estimates], stored.damage)
 
 
 def page(
@@ -85,7 +91,9 @@ def page(
         loader=PackageLoader("hecbench.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
     sections = sections_of_studies(estimates) + sections_of_trials(trials, folder)
-    sections += [_section(group, evidence) for group in groups(estimates)]
+    judged = first.verdict.recording if first else None
+    ordered = sorted(groups(estimates), key=lambda group: (group.is_level, group.title != judged))
+    sections += [_section(group, evidence, has_dots=group.title == judged) for group in ordered]
     sections.sort(key=lambda section: section.folded)
     return environment.get_template("report.html.j2").render(
         sections=sections,
@@ -107,9 +115,9 @@ def page(
     )
 
 
-def _section(group: Group, evidence: Callable[[str], Evidence | None]) -> Section:
+def _section(group: Group, evidence: Callable[[str], Evidence | None], has_dots: bool) -> Section:
     """What the page shows of one level or recording; levels of a study are told there and folded here."""
-    drawn = figures(group)
+    drawn = [] if has_dots else figures(group)
     shown = None if group.is_level else evidence(str(group.estimates[0].provenance.get("recording_sha256")))
     best = best_first(group.estimates)
     if shown is not None:

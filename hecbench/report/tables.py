@@ -56,7 +56,8 @@ def groups(estimates: Iterable[Estimate]) -> list[Group]:
         masks = f", masks: {segmenter}" if segmenter else ""
         if estimate.level is not None:
             return f"{estimate.suite}: {estimate.level}{masks}", "level"
-        return f"{estimate.recording} ({estimate.item}){masks}", "item"
+        where = f" ({estimate.item})" if estimate.item else ""
+        return f"{estimate.recording}{where}{masks}", "item"
 
     ordered = sorted(estimates, key=place)
     return [

@@ -87,7 +87,7 @@ def judge(
         tolerance_mm=tolerance_mm,
         agreement=[Agreement(a.solver, apart_mm(a), a.evidence) for a in near],
         rivals=[
-            Rival(a.solver, apart_mm(a), words.why_apart(a, best, metric, recording.camera, findings))
+            Rival(a.solver, apart_mm(a), words.why_apart(a, best, near, metric, recording.camera, findings))
             for a in far
         ],
         reasons=words.reasons(best, near, confirmed, doubts, recording, apart_mm),
