@@ -29,10 +29,8 @@ def verdict(tmp_path_factory):
 
 def rows():
     lines = [line for line in (ROOT / "README.md").read_text().splitlines() if line.startswith("|")]
-    table = [
-        [cell.strip() for cell in line.strip("|").split("|")]
-        for line in lines[: lines.index("|---|---|---|---|") + 6]
-    ]
+    end = lines.index("|---|---|---|---|") + 6
+    table = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines[:end]]
     return {row[0]: row[1:] for row in table[2:]}
 
 
