@@ -1,8 +1,8 @@
 """Seeded bugs that the tests must catch: each of `mutants.toml` is put into a copy of the tree, and its tests are run.
 
-    python benchmarks/mutants.py [--only WORD] [--keep-going]
+    python benchmarks/mutants.py [--only WORD]
 
-Prints a line per bug and the share caught; exits with 1 below 95 %. A bug whose original text is no longer found exactly
+Prints a line per bug and the share caught; exits with 1 below 95 %. A bug whose original text is not found exactly
 once is an error: the list follows the code.
 """
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import partial
@@ -255,4 +255,3 @@ AnySpec = (
     | TranslatorSpec
     | DeviceSpec
 )
-SpecIterable = Iterable[AnySpec]
