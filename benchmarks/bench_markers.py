@@ -15,7 +15,6 @@ import cv2
 import numpy as np
 from hecbench_datasets.synthetic_faults import FAULTS, arm_recording
 from hecbench_datasets.synthetic_markers import PRESETS, generate, make
-from hecbench_plugins.evaluators.truth import target_registration_error_m
 from hecbench_plugins.markers.reprojection import corner_problem
 from hecbench_plugins.solvers.bundle import Bundle
 
@@ -24,9 +23,11 @@ from hecbench.bundle.adjustment import adjust
 from hecbench.bundle.model import Noise, State, predict
 from hecbench.diagnose import Severity, check
 from hecbench.errors import HecbenchError
+from hecbench.recording import Mounting
 from hecbench.robots.model import load_robot
 from hecbench.specs import Kind, SolverSpec
 from hecbench.targets import ChessboardTarget
+from hecbench.workspace import apart_m, points_in_parent
 
 cv2.setNumThreads(1)
 
@@ -45,10 +46,10 @@ def known_bundle(level):
 
 
 def errors_mm(X, recording):
-    truth = recording.truth_parent_T_camera
+    truth, moves = recording.truth_parent_T_camera, recording.mounting is Mounting.EYE_IN_HAND
     return (
         1e3 * float(se3.translation_error_m(X, truth)),
-        1e3 * target_registration_error_m(X, truth, recording),
+        1e3 * float(apart_m(X, truth, points_in_parent(recording.base_T_flange, moves))),
     )
 
 

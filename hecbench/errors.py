@@ -20,6 +20,10 @@ class TargetNotSeen(InputError):
     """No image shows the target that the recording describes."""
 
 
+class InvalidAnswer(InputError):
+    """What claims to be an estimate is none: a transform that is not rigid, a status without a reason."""
+
+
 class Refusal(HecbenchError):
     """A solver cannot answer on this recording; the message is the reason, one sentence. Status `refused`."""
 

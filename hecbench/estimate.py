@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import files, se3
-from hecbench.errors import InputError
-from hecbench.recording import CameraModel, Mounting
+from hecbench.errors import InputError, InvalidAnswer
+from hecbench.recording import OPENCV, CameraModel, Mounting
 
 Array = NDArray[np.float64]
 
@@ -84,14 +84,16 @@ class Estimate:
 
     def __post_init__(self) -> None:
         if (self.status is Status.OK) != (self.parent_T_camera is not None):
-            raise InputError(f"estimate: status '{self.status}' with parent_T_camera {self.parent_T_camera}")
+            raise InvalidAnswer(
+                f"estimate: status '{self.status}' with parent_T_camera {self.parent_T_camera}"
+            )
         if self.status is not Status.OK and not self.reason:
-            raise InputError(f"estimate: status '{self.status}' needs a reason")
+            raise InvalidAnswer(f"estimate: status '{self.status}' needs a reason")
         for name in ("parent_T_camera", "carrier_T_target"):
             if (pose := getattr(self, name)) is not None:
                 pose = np.asarray(pose, float)
                 if pose.shape != (4, 4) or not se3.is_transform(pose):
-                    raise InputError(f"estimate: {name} is not a rigid transform (4x4, metres)")
+                    raise InvalidAnswer(f"estimate: {name} is not a rigid transform (4x4, metres)")
                 object.__setattr__(self, name, pose)
 
     def to_json(self) -> dict[str, Any]:
@@ -101,6 +103,7 @@ class Estimate:
             "height": self.camera.height,
             "K": self.camera.K,
             "distortion": self.camera.distortion,
+            "distortion_model": self.camera.distortion_model,
         }
         content = {
             "schema": SCHEMA,
@@ -133,17 +136,56 @@ class Estimate:
         files.write_bytes(path, msgspec.json.format(msgspec.json.encode(self.to_json()), indent=1) + b"\n")
 
 
+@dataclass(frozen=True)
+class Metric:
+    """A number by which estimates are ordered: where it stands, and what a reader calls it."""
+
+    section: str
+    name: str
+    label: str
+    smaller_is_better: bool = True
+
+    def of(self, estimate: Estimate) -> float | None:
+        """The number, or None where the estimate has no answer or was not measured so."""
+        value = (getattr(estimate, self.section) or {}).get(self.name)
+        return None if estimate.status is not Status.OK or value is None else float(value)
+
+
+METRICS = (
+    Metric("held_out", "target_mm", "held-out prediction of the target, mm"),
+    Metric("held_out", "reprojection_px", "held-out prediction of the target, px"),
+    Metric("held_out", "contour_px", "held-out distance of the robot's contour, px"),
+    Metric("held_out", "mask_iou", "held-out mask IoU", smaller_is_better=False),
+    Metric("errors", "tre_mm", "error in the workspace, mm"),
+    Metric("errors", "translation_error_mm", "error of the camera centre, mm"),
+    Metric("diagnostics", "target_spread_mm", "spread of the target over the samples, mm"),
+    Metric("diagnostics", "mask_iou", "mask IoU", smaller_is_better=False),
+    Metric("diagnostics", "confirmed_at_end", "share of the contour confirmed", smaller_is_better=False),
+)
+"""By what estimates are ordered, what is preferred first: predictions, errors against the truth, consistency."""
+
+
+def ordering_metric(estimates: Sequence[Estimate]) -> Metric | None:
+    """The one metric of a table: the first that at least half of the answers have; None when there is none."""
+    answered = [estimate for estimate in estimates if estimate.status is Status.OK]
+    for metric in METRICS:
+        measured = sum(metric.of(estimate) is not None for estimate in answered)
+        if measured and 2 * measured >= len(answered):
+            return metric
+    return None
+
+
 def best_first(estimates: Sequence[Estimate]) -> list[Estimate]:
-    """Sorted by held-out prediction, else by error; answers without either come next, missing answers last."""
+    """Sorted by one metric, the same for all; answers without it come next, missing answers last."""
+    metric = ordering_metric(estimates)
 
-    def score(estimate: Estimate) -> tuple[int, float]:
-        measured = {**(estimate.errors or {}), **(estimate.held_out or {})}
-        for name in ("reprojection_px", "target_mm", "tre_mm", "translation_error_mm"):
-            if measured.get(name) is not None:
-                return 0, measured[name]
-        return (1 if estimate.status is Status.OK else 2), 0.0
+    def place(estimate: Estimate) -> tuple[int, float]:
+        value = None if metric is None else metric.of(estimate)
+        if metric is None or value is None:
+            return (1 if estimate.status is Status.OK else 2), 0.0
+        return 0, value if metric.smaller_is_better else -value
 
-    return sorted(estimates, key=score)
+    return sorted(estimates, key=place)
 
 
 def plain(value: Any) -> Any:
@@ -166,6 +208,7 @@ class _CameraJson(msgspec.Struct, forbid_unknown_fields=True):
     height: int
     K: list[list[float]] | None = None
     distortion: list[float] = []
+    distortion_model: str = OPENCV
 
 
 class _EstimateJson(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
@@ -213,7 +256,8 @@ def decode(content: bytes, source: str) -> Estimate:
             K = parsed.camera.K
             distortion = np.array(parsed.camera.distortion, float)
             size = parsed.camera.width, parsed.camera.height
-            values["camera"] = CameraModel(*size, None if K is None else np.array(K, float), distortion)
+            intrinsics = None if K is None else np.array(K, float)
+            values["camera"] = CameraModel(*size, intrinsics, distortion, parsed.camera.distortion_model)
         if parsed.covariance is not None:
             values["covariance"] = np.array(parsed.covariance, float)
         return Estimate(**values)

@@ -22,6 +22,8 @@ FORMATS = ("PNG", "JPEG", "BMP", "TIFF", "PPM", "WEBP")
 _MOST_PIXELS = 80_000_000
 """The largest industrial sensors have 65 million. Pillow's own limit is 89 million."""
 _EXIF_ORIENTATION = 0x0112
+_HALF_A_STEP = 0.5 / 255
+"""Of floats beyond 0..1: what rounding to 8 bits forgives."""
 _DARK_OF_16_BITS = 4096
 """A 16-bit picture without a value above this holds 12 bits or fewer, and would be black when scaled."""
 
@@ -155,7 +157,9 @@ def _eight_bit(array: NDArray[Any], where: str) -> Image:
         return np.asarray(array, np.uint8) * np.uint8(255)
     low, high = (float(array.min()), float(array.max())) if array.size else (0.0, 0.0)
     if array.dtype.kind == "f":
-        if not (low >= 0.0 and high <= 1.0):
+        if not np.isfinite(array).all():
+            raise InputError(f"{where}: the image holds values that are not finite")
+        if low <= -_HALF_A_STEP or high >= 1 + _HALF_A_STEP:
             raise InputError(f"{where}: holds floats from {low:g} to {high:g}; scale them to 0..1")
         return np.asarray(np.round(255 * array), np.uint8)
     if array.dtype.kind not in "iu" or low < 0 or high > 65535:

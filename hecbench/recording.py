@@ -23,7 +23,9 @@ _Value = TypeVar("_Value", np.uint8, np.bool_)
 ImageSource = Path | Image | None
 """A file that is decoded when asked for, an array in memory, or nothing for this sample."""
 
-DISTORTION_LENGTHS = (0, 4, 5, 8, 12, 14)
+OPENCV, EQUIDISTANT = "opencv", "equidistant"
+DISTORTION_LENGTHS = {OPENCV: (0, 4, 5, 8, 12, 14), EQUIDISTANT: (0, 4)}
+"""Numbers of coefficients of each lens model."""
 _ROTATION_TOLERANCE = 1e-3
 
 
@@ -71,13 +73,15 @@ class CameraModel:
         width: of the image, px.
         height: of the image, px.
         K: (3, 3) px, or None when it is still to be calibrated from the images.
-        distortion: (0 | 4 | 5 | 8 | 12 | 14,) coefficients in OpenCV's order.
+        distortion: (0 | 4 | 5 | 8 | 12 | 14,) coefficients in OpenCV's order; none or k1 to k4 of an equidistant lens.
+        distortion_model: "opencv" or "equidistant" (fisheye); see `hecbench.lens`.
     """
 
     width: int
     height: int
     K: Array | None = None
     distortion: Array = field(default_factory=lambda: np.zeros(0))
+    distortion_model: str = OPENCV
 
     def __post_init__(self) -> None:
         if self.width < 1 or self.height < 1:
@@ -92,11 +96,19 @@ class CameraModel:
                 raise InputError("camera.K: is the identity; give the intrinsics in px, or null if unknown")
             object.__setattr__(self, "K", K)
         distortion = np.asarray(self.distortion, float).reshape(-1)
-        if len(distortion) not in DISTORTION_LENGTHS or not np.isfinite(distortion).all():
+        if self.distortion_model not in DISTORTION_LENGTHS:
             raise InputError(
-                f"camera.distortion: {len(distortion)} numbers; give {DISTORTION_LENGTHS} finite ones"
+                f"camera.distortion_model: '{self.distortion_model}' is not one of {', '.join(DISTORTION_LENGTHS)}"
             )
+        lengths = DISTORTION_LENGTHS[self.distortion_model]
+        if len(distortion) not in lengths or not np.isfinite(distortion).all():
+            raise InputError(f"camera.distortion: {len(distortion)} numbers; give {lengths} finite ones")
         object.__setattr__(self, "distortion", distortion)
+
+    @property
+    def is_pinhole(self) -> bool:
+        """Whether the lens bends no ray."""
+        return self.distortion_model == OPENCV and not self.distortion.any()
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)

@@ -25,6 +25,8 @@ from hecbench.specs import AnySpec, Kind, SolverSpec, Spec
 
 hookimpl = pluggy.HookimplMarker(hookspecs.GROUP)
 
+OWN_DISTRIBUTION = "hecbench"
+
 TrialObserver = Callable[..., object]
 """Called as `observer(trial=TrialRecord)`."""
 
@@ -88,6 +90,14 @@ class Registry:
         """Specs of one kind that can be used now."""
         specs = [plugin.spec for plugin in self.select(kind) if plugin.status is PluginStatus.READY]
         return [spec for spec in specs if isinstance(spec, spec_type)]
+
+    def is_foreign(self, solver: str) -> bool:
+        """Whether the solver of that name, options set in it or not, comes from another distribution than ours."""
+        plain, _ = _settings(solver)
+        return any(
+            plugin.kind is Kind.SOLVER and plugin.name == plain and plugin.distribution != OWN_DISTRIBUTION
+            for plugin in self.plugins
+        )
 
     def get(self, kind: Kind, name: str, spec_type: type[AnySpecT]) -> AnySpecT:
         """The ready spec of that name; otherwise an `InputError` that says why not and what there is.

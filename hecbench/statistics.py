@@ -16,6 +16,8 @@ Array = NDArray[np.float64]
 
 CONFIDENCE = 0.95
 _RESAMPLES = 2000
+_LEAST_VALUES = 5
+"""Fewer independent values give no interval: their bootstrap distribution has too few places to end at."""
 
 
 @dataclass(frozen=True)
@@ -41,12 +43,15 @@ def root_mean_square(values: ArrayLike, axis: int = -1) -> Array:
 
 
 def bootstrap(values: ArrayLike, statistic: Callable[..., ArrayLike] = np.mean, seed: int = 0) -> Interval:
-    """`statistic(values, axis=...)` of independent values (N,) with its percentile interval (Efron 1979)."""
+    """`statistic(values, axis=...)` of independent values (N,) with its percentile interval (Efron 1979).
+
+    The order of the values does not matter; the ends are NaN for fewer than five.
+    """
     from scipy import stats
 
-    values = np.asarray(values, float)
+    values = np.sort(np.asarray(values, float))
     estimate = float(np.asarray(statistic(values, axis=-1)))
-    if len(values) < 2:
+    if len(values) < _LEAST_VALUES:
         return Interval(estimate, float("nan"), float("nan"))
     interval = stats.bootstrap(
         (values,),
@@ -62,19 +67,22 @@ def bootstrap(values: ArrayLike, statistic: Callable[..., ArrayLike] = np.mean, 
 def cluster_bootstrap(values: ArrayLike, clusters: Sequence[Hashable], seed: int = 0) -> Interval:
     """The mean of values (N,) when those of one cluster (one calibration, say) are not independent.
 
-    Whole clusters are resampled (Davison and Hinkley 1997, section 3.8).
+    Whole clusters are resampled (Davison and Hinkley 1997, section 3.8). The order of the values does not matter; the
+    ends are NaN for fewer than five clusters.
     """
     from scipy import stats
 
     values = np.asarray(values, float)
     _, labels = np.unique(np.array([repr(cluster) for cluster in clusters]), return_inverse=True)
+    order = np.lexsort((values, labels))
+    values, labels = values[order], labels[order]
     sums, counts = np.bincount(labels, values), np.bincount(labels)
 
     def ratio(cluster_sums: Array, cluster_counts: Array, axis: int = -1) -> Array:
         return np.asarray(cluster_sums.sum(axis) / cluster_counts.sum(axis))
 
     estimate = float(values.mean())
-    if len(sums) < 2:
+    if len(sums) < _LEAST_VALUES:
         return Interval(estimate, float("nan"), float("nan"))
     interval = stats.bootstrap(
         (sums, counts),

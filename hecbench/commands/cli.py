@@ -8,21 +8,17 @@ import is imported by the verb that uses it.
 from __future__ import annotations
 
 import os
-import shlex
 import sys
 from importlib import metadata
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 import click
 
 from hecbench import __version__
-from hecbench.commands import console
+from hecbench.commands import choices, console
+from hecbench.commands.run import demo, run
+from hecbench.commands.solve import solve
 from hecbench.errors import HecbenchError, InputError
-
-if TYPE_CHECKING:
-    from hecbench.running.runner import Task
-    from hecbench.running.solving import Options
 
 COMMAND_GROUP = "hecbench.commands"
 """Entry points of further verbs, loaded when they are named."""
@@ -66,52 +62,13 @@ def cli() -> None:
     """Calibrate hand-eye rigs with every method, measure all by the same rulers, and report."""
 
 
-_json = click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else.")
-_seed = click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
-_solver = click.option(
-    "--solver",
-    "solvers",
-    multiple=True,
-    metavar="NAME",
-    help="Repeatable; NAME[OPTION=VALUE,...] sets options of it; default: all that can.",
-)
-_unknown = click.option(
-    "--unknown",
-    type=click.Choice(["joints", "scale", "focal"]),
-    multiple=True,
-    help="Solve for this too, by every solver with the option `unknown`; repeatable.",
-)
-_segmenter = click.option(
-    "--segmenter", metavar="NAME", help="Whose masks of the robot are used; default: those of the recording."
-)
-_folder = click.Path(path_type=Path, file_okay=False)
-_file = click.Path(path_type=Path, dir_okay=False)
-_any_path = click.Path(path_type=Path)
-
-
-@cli.command()
-@click.option("--out", type=_folder, default=Path("out/demo"), show_default=True)
-@click.option(
-    "--samples", type=click.IntRange(min=1), default=40, show_default=True, help="Recordings per setting."
-)
-@_seed
-def demo(out: Path, samples: int, seed: int) -> None:
-    """Calibrate generated recordings with every ready solver; print the tables and write the report."""
-    from hecbench.report import html
-    from hecbench.running import planning
-    from hecbench.storage import store
-
-    (out / store.FILE_NAME).unlink(missing_ok=True)
-    levels = ("tag_2m", "small_tag_2m", "board_2m")
-    tasks = planning.suite_tasks("markers", levels, samples, (), seed)
-    contents = _run(tasks, out, _options(seed), jobs=os.cpu_count() or 1)
-    console.print_tables(contents.estimates)
-    click.echo(f"report: {html.write(out).path}")
+for _verb in (demo, run, solve):
+    cli.add_command(_verb)
 
 
 @cli.command()
 @click.option("--kind", help="Only this kind: solver, dataset, suite, ...")
-@_json
+@choices.as_json
 def plugins(kind: str | None, as_json: bool) -> None:
     """List every plugin, also those that are missing something, broken or in conflict."""
     from hecbench import registry
@@ -133,110 +90,8 @@ def plugins(kind: str | None, as_json: bool) -> None:
 
 
 @cli.command()
-@click.argument("recording", type=_any_path)
-@_solver
-@_segmenter
-@_unknown
-@click.option("--views", type=click.IntRange(min=1), help="Use this many samples, drawn with --seed.")
-@click.option("--init", type=_file, help="An estimate to start from instead of initial_parent_T_camera.")
-@click.option(
-    "--held-out/--no-held-out",
-    default=None,
-    help="Predict left-out samples; default: where truth is not given.",
-)
-@click.option("--out", type=_folder, help="Write each estimate to DIR/<solver>.json.")
-@_seed
-@_json
-def solve(
-    recording: Path,
-    solvers: tuple[str, ...],
-    segmenter: str | None,
-    unknown: tuple[str, ...],
-    views: int | None,
-    init: Path | None,
-    held_out: bool | None,
-    out: Path | None,
-    seed: int,
-    as_json: bool,
-) -> None:
-    """Calibrate one RECORDING; the best estimate comes first."""
-    from hecbench import preparation
-    from hecbench.estimate import Status, best_first
-    from hecbench.report.tables import Group, table
-    from hecbench.running import planning, solving
-
-    loaded = planning.adjusted(preparation.load_recording(recording), views, init, seed)
-    specs = planning.with_unknowns(planning.solvers_for(solvers, loaded, segmenter), unknown)
-    if not specs:
-        raise HecbenchError(
-            f"{recording}: no ready solver can use what it offers: {', '.join(sorted(loaded.offers()))}"
-        )
-    options = _options(seed, held_out, segmenter)
-    estimates = best_first(solving.solve(loaded, specs, options, say=console.say))
-    for estimate in estimates if out else ():
-        estimate.save(Path(str(out)) / f"{estimate.solver}.json")
-    if as_json:
-        console.print_json([estimate.to_json() for estimate in estimates])
-    else:
-        console.print_table(table(Group(loaded.name, tuple(estimates), is_level=False)))
-        console.print_answer(estimates[0])
-    answered = [estimate.status is Status.OK for estimate in estimates]
-    if not any(answered) or (solvers and not all(answered)):
-        sys.exit(1)
-
-
-@cli.command()
-@click.argument("sources", nargs=-1, required=True, metavar="SUITE|RECORDING...")
-@_solver
-@_segmenter
-@click.option(
-    "--level", "levels", multiple=True, metavar="L", help="Level of the suite; repeatable; default: all."
-)
-@click.option("--samples", type=click.IntRange(min=1), help="Recordings per level; default: the suite's.")
-@click.option("--held-out/--no-held-out", default=None, help="As for solve.")
-@click.option("--out", type=_folder, help="Default: out/<first source's name>.")
-@click.option("--jobs", type=int, default=1, show_default=True, help="Worker processes; -1: one per core.")
-@click.option("--executor", metavar="URL", help="A dask scheduler, tcp://host:port, instead of --jobs.")
-@click.option("--resume", is_flag=True, help="Go on with what --out holds.")
-@_seed
-@_json
-def run(
-    sources: tuple[str, ...],
-    solvers: tuple[str, ...],
-    segmenter: str | None,
-    levels: tuple[str, ...],
-    samples: int | None,
-    held_out: bool | None,
-    out: Path | None,
-    jobs: int,
-    executor: str | None,
-    resume: bool,
-    seed: int,
-    as_json: bool,
-) -> None:
-    """Run solvers on a SUITE or on RECORDINGs into an append-only store; print the tables."""
-    from hecbench.running import planning
-
-    if jobs == 0:
-        raise InputError("--jobs 0: give a number of processes, or -1 for one per core")
-    tasks = planning.tasks(sources, solvers, levels, samples, seed, segmenter)
-    out = out or Path("out") / Path(sources[0]).name
-    options = _options(seed, held_out, segmenter)
-    contents = _run(tasks, out, options, jobs=jobs, executor=executor, resume=resume)
-    for sentence in contents.damage:
-        console.say(sentence)
-    if as_json:
-        console.print_json([estimate.to_json() for estimate in contents.estimates])
-    else:
-        console.print_tables(contents.estimates)
-    click.echo(f"results: {out}; see them with: hecbench report {out}", err=True)
-    if not any(estimate.parent_T_camera is not None for estimate in contents.estimates):
-        sys.exit(1)
-
-
-@cli.command()
-@click.argument("folder", type=_folder, metavar="DIR")
-@_json
+@click.argument("folder", type=choices.FOLDER, metavar="DIR")
+@choices.as_json
 def report(folder: Path, as_json: bool) -> None:
     """Write DIR/report.html from the results and trials that were left in DIR."""
     from hecbench.report import html
@@ -255,7 +110,7 @@ def report(folder: Path, as_json: bool) -> None:
 @cli.command()
 @click.argument("name")
 @click.option("--kind", help="Of plugins of one name, the one of this kind: solver, segmenter, dataset, ...")
-@_json
+@choices.as_json
 def conformance(name: str, kind: str | None, as_json: bool) -> None:
     """Run the plugin author's checks on the plugin NAME."""
     from dataclasses import asdict
@@ -275,7 +130,7 @@ def conformance(name: str, kind: str | None, as_json: bool) -> None:
 
 
 @cli.command()
-@_json
+@choices.as_json
 def doctor(as_json: bool) -> None:
     """Say what is installed, what is missing and how to get it."""
     from hecbench.commands import doctor as examination
@@ -290,10 +145,10 @@ def doctor(as_json: bool) -> None:
 
 
 @cli.command()
-@click.argument("recording", type=_any_path)
-@_json
+@click.argument("recording", type=choices.ANY_PATH)
+@choices.as_json
 def check(recording: Path, as_json: bool) -> None:
-    """ViewInformation for faults in a RECORDING before anything is solved; exits with 3 on a critical one."""
+    """Look for faults in a RECORDING before anything is solved; exits with 3 on a critical one."""
     from hecbench import diagnose, preparation
     from hecbench.diagnose import Severity
     from hecbench.report.tables import Table
@@ -313,9 +168,9 @@ def check(recording: Path, as_json: bool) -> None:
 
 
 @cli.command()
-@click.argument("recording", type=_any_path)
-@click.option("--estimate", "answer", type=_file, required=True, help="An estimate of this recording.")
-@click.option("--out", type=_folder, help="Folder of the pictures; default: out/render/<recording>.")
+@click.argument("recording", type=choices.ANY_PATH)
+@click.option("--estimate", "answer", type=choices.FILE, required=True, help="An estimate of this recording.")
+@click.option("--out", type=choices.FOLDER, help="Folder of the pictures; default: out/render/<recording>.")
 def render(recording: Path, answer: Path, out: Path | None) -> None:
     """Draw the robot over the images of a RECORDING where an estimate places it."""
     from hecbench import estimate, files, preparation
@@ -329,12 +184,12 @@ def render(recording: Path, answer: Path, out: Path | None) -> None:
 
 
 @cli.command(name="import")
-@click.argument("source", type=_any_path, metavar="SRC")
-@click.argument("destination", type=_folder, metavar="DEST")
+@click.argument("source", type=choices.ANY_PATH, metavar="SRC")
+@click.argument("destination", type=choices.FOLDER, metavar="DEST")
 @click.option(
     "--format", "format_name", metavar="F", help="A dataset of `hecbench plugins`; default: recognised."
 )
-@click.option("--urdf", type=_file, help="The robot's model; it is copied with its meshes into DEST.")
+@click.option("--urdf", type=choices.FILE, help="The robot's model; it is copied with its meshes into DEST.")
 def import_recording(source: Path, destination: Path, format_name: str | None, urdf: Path | None) -> None:
     """Read a recording SRC of any known format and write it as a native folder DEST."""
     from hecbench import preparation, registry
@@ -357,9 +212,9 @@ def import_recording(source: Path, destination: Path, format_name: str | None, u
 
 
 @cli.command()
-@click.argument("estimate", type=_file)
+@click.argument("estimate", type=choices.FILE)
 @click.option("--to", "format_name", required=True, metavar="F", help="An exporter of `hecbench plugins`.")
-@click.option("--out", type=_file, help="Write to this file instead of stdout.")
+@click.option("--out", type=choices.FILE, help="Write to this file instead of stdout.")
 @click.option("--parent", help="Name of the parent frame; default: the estimate's.")
 @click.option("--child", help="Frame to place, such as camera_link; default: the optical frame itself.")
 @click.option("--optical", help="Name of the camera's optical frame.")
@@ -382,36 +237,3 @@ def export(estimate: Path, format_name: str, out: Path | None, **options: str | 
     else:
         files.write_text(out, text)
         click.echo(f"{out}: {exporter.summary}")
-
-
-def _options(seed: int, held_out: bool | None = None, segmenter: str | None = None) -> Options:
-    from hecbench.running.solving import Options
-
-    words = ["hecbench", *(word for word in sys.argv[1:] if word != "--resume")]
-    return Options(seed=seed, held_out=held_out, command=shlex.join(words), segmenter=segmenter)
-
-
-def _run(
-    tasks: list[Task],
-    out: Path,
-    options: Options,
-    *,
-    jobs: int,
-    executor: str | None = None,
-    resume: bool = False,
-) -> Any:
-    """Run tasks into a store under a progress bar on stderr."""
-    from dataclasses import replace
-
-    from hecbench.running import runner
-
-    with console.progress(sum(len(task.solvers) for task in tasks)) as advance:
-        return runner.run(
-            tasks,
-            replace(options, stop_on_bad_input=False),
-            out=out,
-            jobs=jobs,
-            executor=executor,
-            resume=resume,
-            on_result=lambda found: advance(len(found)),
-        )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +12,7 @@ import click
 if TYPE_CHECKING:
     from hecbench.estimate import Estimate
     from hecbench.report.tables import Table
+    from hecbench.specs import SolverSpec
 
 _PIPE_WIDTH = 200
 
@@ -54,8 +55,8 @@ def print_table(table: Table) -> None:
     console.print()
 
 
-def print_answer(estimate: Estimate) -> None:
-    """The transform with its frames named."""
+def print_answer(estimate: Estimate, do_not_use: bool = False) -> None:
+    """The transform with its frames named; marked where the data do not allow an answer."""
     import numpy as np
 
     from hecbench import se3
@@ -65,19 +66,86 @@ def print_answer(estimate: Estimate) -> None:
     translation = ", ".join(f"{value:.5f}" for value in estimate.parent_T_camera[:3, 3])
     quaternion = ", ".join(f"{value:.6f}" for value in se3.to_quat_xyzw(estimate.parent_T_camera))
     matrix = np.array2string(estimate.parent_T_camera, precision=6, suppress_small=True, prefix="  ")
-    click.echo(f"{estimate.parent_link}_T_camera by {estimate.solver}:")
+    mark = "DO NOT USE " if do_not_use else ""
+    click.echo(f"{mark}{estimate.parent_link}_T_camera by {estimate.solver}:")
     click.echo(f"  translation m: [{translation}]   quaternion x y z w: [{quaternion}]")
     click.echo(f"  {matrix}")
+
+
+def print_critical(findings: Iterable[Mapping[str, Any]], of: str) -> bool:
+    """The critical findings on stderr, and whether there are any."""
+    critical = [finding for finding in findings if finding["severity"] == "critical"]
+    for finding in critical:
+        action = f" -> {finding['action']}" if finding["action"] else ""
+        say(f"CRITICAL {finding['id']}: {finding['summary']}{action}")
+    if critical:
+        say(f"{of}: do not use an answer from these data before this is mended; see `hecbench check`")
+    return bool(critical)
+
+
+_SLOW_WEIGHT = 30
+"""How many times as long as a closed form a slow method takes, roughly, for the time that is left."""
+
+
+class Progress:
+    """A bar on stderr with the method at work; where stderr is no terminal, a line for each slow method."""
+
+    def __init__(self, specs: Sequence[SolverSpec]) -> None:
+        from rich.console import Console
+        from rich.progress import BarColumn, SpinnerColumn, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+        from rich.progress import Progress as Bar
+
+        console = Console(stderr=True)
+        columns = (
+            SpinnerColumn(),
+            TextColumn("{task.description}"),
+            BarColumn(),
+            TimeElapsedColumn(),
+            TextColumn("left"),
+            TimeRemainingColumn(),
+        )
+        self._shown = console.is_terminal
+        self._bar = Bar(*columns, console=console, transient=True, disable=not self._shown)
+        self._task = self._bar.add_task("reading", total=sum(map(self._weight, specs)))
+        self._at_work: SolverSpec | None = None
+
+    @staticmethod
+    def _weight(spec: SolverSpec) -> int:
+        return _SLOW_WEIGHT if spec.slow else 1
+
+    def __enter__(self) -> Progress:
+        self._bar.start()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self._bar.stop()
+
+    def start(self, spec: SolverSpec) -> None:
+        """A method begins."""
+        self._at_work = spec
+        self._bar.update(self._task, description=spec.name)
+        if spec.slow and not self._shown:
+            say(f"{spec.name} is at work; it may take minutes")
+
+    def done(self, estimate: Estimate) -> None:
+        """The method at work has ended."""
+        if self._at_work is not None:
+            self._bar.advance(self._task, self._weight(self._at_work))
+        if self._shown:
+            self._bar.console.print(
+                f"{estimate.solver}: {estimate.status}, {estimate.seconds:.2g} s", style="dim"
+            )
 
 
 @contextmanager
 def progress(total: int) -> Iterator[Callable[[int], None]]:
     """A bar on stderr when that is a terminal; yields the function that advances it."""
     from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import Progress as Bar
 
     columns = TextColumn("calibrations"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()
     console = Console(stderr=True)
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
+    with Bar(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("", total=total)
         yield lambda count: bar.advance(task, count)

@@ -8,12 +8,11 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import se3
 from hecbench.bundle.model import Problem, State, linearise
 from hecbench.diagnose.case import Examination
 from hecbench.diagnose.fit import TYPICAL_NOISE
 from hecbench.recording import Mounting
-from hecbench.workspace import cube_corners
+from hecbench.workspace import points_in_parent, squared_displacement
 
 Array = NDArray[np.float64]
 
@@ -53,11 +52,7 @@ class Precision:
 
     @property
     def _to_points(self) -> Array:
-        """(6, 6) quadratic form of a left twist [phi, rho]: the mean squared displacement of the points."""
-        derivative = np.concatenate(
-            [-se3.hat(self.points_m), np.tile(np.eye(3), (len(self.points_m), 1, 1))], 2
-        )
-        return np.asarray((np.swapaxes(derivative, 1, 2) @ derivative).mean(0))
+        return squared_displacement(self.points_m)
 
 
 def information_of(problem: Problem, state: State) -> tuple[Array, Array]:
@@ -77,13 +72,5 @@ def precision(case: Examination) -> Precision | None:
     problem = replace(found.subset(agreeing).problem, free_scale=False)
     state = case.solution.state
     information, gradients = information_of(problem, state)
-    points = _workspace_points(case.recording.mounting, problem.base_T_flange)
+    points = points_in_parent(problem.base_T_flange, case.recording.mounting is Mounting.EYE_IN_HAND)
     return Precision(problem, state, information, gradients, points, case.noise_factor)
-
-
-def _workspace_points(mounting: Mounting, base_T_flange: Array) -> Array:
-    """The corners of a cube around the mean flange position, in the parent frame, as in the rulers."""
-    corners = cube_corners(base_T_flange)
-    if mounting is Mounting.EYE_TO_HAND:
-        return corners
-    return se3.transform_points(se3.inverse(base_T_flange), corners).reshape(-1, 3)

@@ -1,8 +1,4 @@
-"""Undistorted pictures: one resampling of image or mask, after which the camera is an exact pinhole.
-
-The lens model is OpenCV's rational, tangential, thin-prism and tilted one (OpenCV documentation, "Camera
-Calibration and 3D Reconstruction", the equations of the pinhole camera model).
-"""
+"""Undistorted pictures: one resampling of image or mask, after which the camera is an exact pinhole."""
 
 from __future__ import annotations
 
@@ -13,30 +9,10 @@ from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 
 from hecbench.errors import InputError
+from hecbench.lens import distort
 from hecbench.recording import CameraModel
 
 Array = NDArray[np.float64]
-
-
-def distort(points: Array, coefficients: Array) -> Array:
-    """Distorted normalised coordinates (..., 2) of ideal ones (..., 2), for 0 to 14 coefficients in OpenCV's order."""
-    k = np.zeros(14)
-    k[: len(coefficients)] = coefficients
-    x, y = points[..., 0], points[..., 1]
-    r2 = x * x + y * y
-    radial = (1 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]))) / (1 + r2 * (k[5] + r2 * (k[6] + r2 * k[7])))
-    u = x * radial + 2 * k[2] * x * y + k[3] * (r2 + 2 * x * x) + r2 * (k[8] + r2 * k[9])
-    v = y * radial + k[2] * (r2 + 2 * y * y) + 2 * k[3] * x * y + r2 * (k[10] + r2 * k[11])
-    if not k[12:].any():
-        return np.stack([u, v], -1)
-    tilted = np.stack([u, v, np.ones_like(u)], -1) @ _tilt(k[12], k[13]).T
-    return np.asarray(tilted[..., :2] / tilted[..., 2:])
-
-
-def _tilt(about_x: float, about_y: float) -> Array:
-    cx, sx, cy, sy = np.cos(about_x), np.sin(about_x), np.cos(about_y), np.sin(about_y)
-    R = np.array([[cy, 0, -sy], [0, 1, 0], [sy, 0, cy]]) @ np.array([[1, 0, 0], [0, cx, sx], [0, -sx, cx]])
-    return np.asarray(np.array([[R[2, 2], 0, -R[0, 2]], [0, R[2, 2], -R[1, 2]], [0, 0, 1]]) @ R)
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,11 +31,11 @@ class Undistortion:
         """
         if camera.K is None:
             raise InputError("camera.K is unknown: calibrate the intrinsics first")
-        if not camera.distortion.any():
+        if camera.is_pinhole:
             return Undistortion(camera.K, None)
         v, u = np.mgrid[0 : camera.height, 0 : camera.width].astype(float)
         rays = np.stack([u, v, np.ones_like(u)], -1) @ np.linalg.inv(camera.K).T
-        distorted = distort(rays[..., :2], camera.distortion)
+        distorted = distort(rays[..., :2], camera)
         homogeneous = np.concatenate([distorted, np.ones_like(distorted[..., :1])], -1)
         pixels = homogeneous @ camera.K.T
         return Undistortion(camera.K, np.stack([pixels[..., 1], pixels[..., 0]]))

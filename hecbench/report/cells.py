@@ -22,7 +22,9 @@ def number(value: float | np.floating | None) -> str:
 
 
 def interval(interval: Interval) -> str:
-    """A value and its interval."""
+    """A value and its interval, where it has one."""
+    if np.isnan(interval.low) or np.isnan(interval.high):
+        return number(interval.value)
     return f"{number(interval.value)} [{number(interval.low)}, {number(interval.high)}]"
 
 

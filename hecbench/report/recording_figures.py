@@ -12,25 +12,16 @@ from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.estimate import Estimate
-from hecbench.recording import CameraModel, Mounting
-from hecbench.rendering.undistort import distort
+from hecbench.lens import project
+from hecbench.recording import Mounting
 from hecbench.report.svg import DARK, LIGHT, RED, panel, svg
 from hecbench.storage.evidence import Evidence
-from hecbench.workspace import cube_corners
+from hecbench.workspace import apart_m, points_in_parent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Array = NDArray[np.float64]
-
-
-def project(camera: CameraModel, points_c: Array) -> Array:
-    """Pixels (..., 2) of points (..., 3) m in the camera's frame; NaN behind the camera."""
-    assert camera.K is not None
-    with np.errstate(divide="ignore", invalid="ignore"):
-        ideal = np.where(points_c[..., 2:] > 0, points_c[..., :2] / points_c[..., 2:], np.nan)
-    distorted = distort(ideal, camera.distortion)
-    return np.asarray(distorted @ camera.K[:2, :2].T + camera.K[:2, 2])
 
 
 def residuals_px(evidence: Evidence, estimate: Estimate) -> Array | None:
@@ -124,14 +115,9 @@ def agreement_figure(evidence: Evidence, estimates: Sequence[Estimate]) -> str |
     answered = [e for e in estimates if e.parent_T_camera is not None]
     if len(answered) < 2 or evidence.base_T_flange is None:
         return None
-    base_T_flange = evidence.base_T_flange[np.isfinite(evidence.base_T_flange).all((1, 2))]
-    points = cube_corners(base_T_flange)
-    chain = np.eye(4)[None] if evidence.mounting is Mounting.EYE_TO_HAND else base_T_flange
+    points_m = points_in_parent(evidence.base_T_flange, evidence.mounting is Mounting.EYE_IN_HAND)
     answers = np.array([e.parent_T_camera for e in answered])
-    in_camera = se3.transform_points(se3.inverse(chain[:, None] @ answers), points)
-    back = (chain[:, None] @ answers)[:, :, None]
-    apart_m = se3.transform_points(back, in_camera[:, None]) - points
-    apart_mm = 1e3 * np.sqrt((apart_m**2).sum(-1).mean((0, 3)))
+    apart_mm = 1e3 * apart_m(answers[:, None], answers, points_m)
     figure, (axes,) = panel(2.6 + 0.5 * len(answered), 1.4 + 0.36 * len(answered), columns=1)
     axes.imshow(np.log10(np.maximum(apart_mm, 0.01)), cmap="Blues", vmin=-1, vmax=3)
     names = [e.solver for e in answered]
@@ -140,7 +126,7 @@ def agreement_figure(evidence: Evidence, estimates: Sequence[Estimate]) -> str |
     for i, j in np.ndindex(*apart_mm.shape):
         colour = "white" if apart_mm[i, j] > 30 else "black"
         if i != j:
-            axes.text(j, i, _short(apart_mm[i, j]), ha="center", va="center", fontsize=7, color=colour)
+            axes.text(j, i, _short(float(apart_mm[i, j])), ha="center", va="center", fontsize=7, color=colour)
     axes.set_title("methods apart in the workspace, mm", fontsize=10)
     return svg(figure)
 

@@ -9,7 +9,7 @@ from itertools import groupby
 import numpy as np
 
 from hecbench import statistics
-from hecbench.estimate import Estimate, Status, best_first
+from hecbench.estimate import Estimate, Status, best_first, ordering_metric
 from hecbench.report.cells import ABSENT, NO_ANSWER, interval, number, percent
 from hecbench.report.scores import not_as_published
 from hecbench.statistics import Interval
@@ -135,6 +135,9 @@ def _recording_table(title: str, estimates: Sequence[Estimate]) -> Table:
         ("median mm", lambda e: number((e.held_out or {}).get("target_mm_median"))),
         ("held-out deg", lambda e: number((e.held_out or {}).get("target_deg"))),
         ("held-out mask IoU [95 %]", lambda e: _held_out(e, "mask_iou")),
+        ("held-out contour px [95 %]", lambda e: _held_out(e, "contour_px")),
+        ("held-out confirmed", lambda e: number((e.held_out or {}).get("confirmed"))),
+        ("confirmed", lambda e: number(e.diagnostics.get("confirmed_at_end"))),
         ("mask IoU", lambda e: number(e.diagnostics.get("mask_iou"))),
         ("masks IoU with given", lambda e: number(e.diagnostics.get("masks_iou_given"))),
         ("masks IoU with truth", lambda e: number((e.errors or {}).get("masks_iou_truth"))),
@@ -143,6 +146,7 @@ def _recording_table(title: str, estimates: Sequence[Estimate]) -> Table:
         ("keypoints median px", lambda e: number(e.diagnostics.get("keypoint_median_px"))),
         ("PCK @50 px", lambda e: number(e.diagnostics.get("pck_50_px"))),
         ("TRE mm", lambda e: number((e.errors or {}).get("tre_mm"))),
+        ("pair TRE mm", _pair_tre),
         ("camera centre mm", lambda e: number((e.errors or {}).get("translation_error_mm"))),
         ("rotation deg", lambda e: number((e.errors or {}).get("rotation_error_deg"))),
         ("ms", lambda e: number(1e3 * e.seconds)),
@@ -154,23 +158,48 @@ def _recording_table(title: str, estimates: Sequence[Estimate]) -> Table:
         for i, (e, rank) in enumerate(zip(estimates, _held_out_ranks(estimates), strict=True))
     )
     notes = (
-        "Held-out: rms prediction of samples left out in 5 folds, the target pose refitted by the ruler. "
-        "Spread: rms deviation of the constant target pose over all samples, raw robot poses.",
+        *_explained(shown),
+        *_ordered_by(estimates),
         *_reasons(estimates),
         *not_as_published(estimates),
     )
     return Table(title, ("solver", "status", "rank", *shown), rows, notes, left=2)
 
 
+_EXPLANATIONS = {
+    "held-out mm [95 %]": "Held-out: rms prediction of samples left out in 5 folds, the target pose refitted by the "
+    "evaluator; an estimate with its own camera is judged with that camera.",
+    "held-out contour px [95 %]": "Contour: rms distance of the robot's drawn contour in left-out photographs.",
+    "spread mm": "Spread: rms deviation of the constant target pose over all samples, raw robot poses.",
+    "pair TRE mm": "Pair TRE: the workspace error of a pose with the camera that the method changed; equal to the TRE "
+    "where the camera is the recording's.",
+}
+
+
+def _explained(shown: Sequence[str]) -> list[str]:
+    """What the columns of this table mean, no others."""
+    return [text for name, text in _EXPLANATIONS.items() if name in shown]
+
+
+def _ordered_by(estimates: Sequence[Estimate]) -> list[str]:
+    """By what the rows are ordered, and which answers come last for want of it."""
+    metric = ordering_metric(estimates)
+    if metric is None:
+        return []
+    without = [e.solver for e in estimates if e.status is Status.OK and metric.of(e) is None]
+    last = f"; not measured so, therefore last: {', '.join(without)}" if without else ""
+    return [f"Ordered by: {metric.label}{last}."]
+
+
 def _held_out_ranks(estimates: Sequence[Estimate]) -> list[str]:
-    """Shared ranks by held-out prediction, in pixels where there are pixels."""
-    for name in ("reprojection_px", "target_mm"):
-        known = [i for i, e in enumerate(estimates) if name in (e.held_out or {})]
-        if known:
-            ranks = statistics.shared_ranks([_held_out_interval(estimates[i], name) for i in known])
-            texts = dict(zip(known, map(str, ranks), strict=True))
-            return [texts.get(i, ABSENT) for i in range(len(estimates))]
-    return [ABSENT] * len(estimates)
+    """Shared ranks by the metric that orders the rows, where it is a held-out prediction with intervals."""
+    metric = ordering_metric(estimates)
+    if metric is None or metric.section != "held_out" or not metric.smaller_is_better:
+        return [ABSENT] * len(estimates)
+    known = [i for i, e in enumerate(estimates) if metric.of(e) is not None]
+    ranks = statistics.shared_ranks([held_out_interval(estimates[i], metric.name) for i in known])
+    texts = dict(zip(known, map(str, ranks), strict=True))
+    return [texts.get(i, ABSENT) for i in range(len(estimates))]
 
 
 def _reasons(estimates: Iterable[Estimate]) -> list[str]:
@@ -185,11 +214,20 @@ def _reasons(estimates: Iterable[Estimate]) -> list[str]:
     ]
 
 
+def _pair_tre(estimate: Estimate) -> str:
+    """Only where the method changed the camera: elsewhere it is the TRE again."""
+    errors = estimate.errors or {}
+    pair = errors.get("pair_tre_mm")
+    return ABSENT if pair is None or pair == errors.get("tre_mm") else number(pair)
+
+
 def _held_out(estimate: Estimate, name: str) -> str:
-    return interval(_held_out_interval(estimate, name)) if name in (estimate.held_out or {}) else ABSENT
+    return interval(held_out_interval(estimate, name)) if name in (estimate.held_out or {}) else ABSENT
 
 
-def _held_out_interval(estimate: Estimate, name: str) -> Interval:
+def held_out_interval(estimate: Estimate, name: str) -> Interval:
+    """A held-out number with its interval; NaN ends where it has none."""
     held_out = estimate.held_out or {}
-    low, high = (np.nan if end is None else end for end in held_out[f"{name}_interval"])
+    ends = held_out.get(f"{name}_interval") or (None, None)
+    low, high = (np.nan if end is None else end for end in ends)
     return Interval(held_out[name], low, high)

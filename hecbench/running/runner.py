@@ -14,7 +14,7 @@ from hecbench.errors import InputError
 from hecbench.estimate import Estimate
 from hecbench.preparation import load_recording, prepare, segmented
 from hecbench.recording import Recording
-from hecbench.running.solving import Options, provenance, solve_prepared
+from hecbench.running.solving import Options, each_solved, provenance
 from hecbench.specs import Kind, SolverSpec, SuiteSpec
 from hecbench.storage import evidence, store
 from hecbench.storage.evidence import Evidence
@@ -63,7 +63,7 @@ def execute(task: Task, options: Options) -> tuple[list[Estimate], Evidence | No
     origin = provenance(recording, options) | ({"facts": dict(facts)} if facts else {})
     estimates = [
         replace(estimate, suite=task.suite or "files", level=task.level, item=task.item)
-        for estimate in solve_prepared(prepared, specs, options, origin)
+        for estimate in each_solved(prepared, specs, options, origin)
     ]
     return estimates, None if task.path is None else _examined(recording, ready)
 

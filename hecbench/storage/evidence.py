@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from hecbench import files
 from hecbench.errors import InputError
-from hecbench.recording import CameraModel, Mounting, Recording
+from hecbench.recording import OPENCV, CameraModel, Mounting, Recording
 
 Array = NDArray[np.float64]
 
@@ -54,6 +54,7 @@ class Evidence:
     points_m: Array | None = None
     K: Array | None = None
     distortion: Array | None = None
+    distortion_model: str = OPENCV
     influence_mm: Array | None = None
 
     @property
@@ -61,7 +62,8 @@ class Evidence:
         """The camera, when its intrinsics are known."""
         if self.size is None or self.K is None:
             return None
-        return CameraModel(*self.size, self.K, np.zeros(0) if self.distortion is None else self.distortion)
+        distortion = np.zeros(0) if self.distortion is None else self.distortion
+        return CameraModel(*self.size, self.K, distortion, self.distortion_model)
 
 
 def collect(
@@ -82,6 +84,7 @@ def collect(
         points_m=target.points_m if target else None,
         K=camera.K if camera else None,
         distortion=camera.distortion if camera else None,
+        distortion_model=camera.distortion_model if camera else OPENCV,
         influence_mm=influence_mm,
     )
 
@@ -116,6 +119,7 @@ def save(evidence: Evidence, folder: Path) -> None:
         "mounting": evidence.mounting,
         "sample_ids": evidence.sample_ids,
         "size": evidence.size,
+        "distortion_model": evidence.distortion_model,
         "findings": evidence.findings,
     }
     content: dict[str, Any] = {"description": np.frombuffer(msgspec.json.encode(described), np.uint8)}
@@ -144,6 +148,7 @@ def load(folder: Path, sha256: str) -> Evidence | None:
         mounting=Mounting(described["mounting"]),
         sample_ids=tuple(described["sample_ids"]),
         size=described["size"] and tuple(described["size"]),
+        distortion_model=described.get("distortion_model", OPENCV),
         findings=described["findings"],
         pictures={int(n.removeprefix(prefix)): content[n].tobytes() for n in content if n.startswith(prefix)},
         **{name: content.get(name) for name in _ARRAYS},

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from hecbench import files, pictures
 from hecbench.errors import InputError
 from hecbench.estimate import plain
-from hecbench.recording import CameraModel, ImageSource, Mounting, Recording, RobotDescription
+from hecbench.recording import OPENCV, CameraModel, ImageSource, Mounting, Recording, RobotDescription
 from hecbench.robots import urdf_files
 from hecbench.targets import AprilTagTarget, CharucoTarget, ChessboardTarget, PointsTarget, Target
 
@@ -44,6 +44,7 @@ class _Camera(_Strict):
     height: Count
     K: Matrix | None = None
     distortion: list[float] | None = None
+    distortion_model: str = OPENCV
 
 
 class _Points(_Strict, tag_field="kind", tag="points"):
@@ -172,7 +173,8 @@ def _camera(parsed: _Camera | None) -> CameraModel | None:
     if parsed is None:
         return None
     K = _optional_array("camera.K", parsed.K)
-    return CameraModel(parsed.width, parsed.height, K, np.array(parsed.distortion or [], float))
+    distortion = np.array(parsed.distortion or [], float)
+    return CameraModel(parsed.width, parsed.height, K, distortion, parsed.distortion_model)
 
 
 def _target(parsed: _Points | _Chessboard | _Charuco | _AprilTag | None) -> Target | None:
@@ -290,6 +292,7 @@ def save(recording: Recording, folder: str | Path) -> None:
         "height": recording.camera.height,
         "K": recording.camera.K,
         "distortion": recording.camera.distortion,
+        "distortion_model": recording.camera.distortion_model,
     }
     content = {
         "schema": SCHEMA,

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -55,11 +56,29 @@ def test_solve_with_named_solver_views_and_start(hecbench, cell, tmp_path):
 def test_a_named_solver_without_an_answer_exits_1(hecbench, tmp_path):
     still = conformance.rig(np.random.default_rng(1), Mounting.EYE_TO_HAND, rotations=np.zeros((8, 3)))
     recording_io.save(still, tmp_path / "still")
-    done = hecbench("solve", tmp_path / "still", "--solver", "park", "--json")
+    done = hecbench("solve", tmp_path / "still", "--solver", "park", "--json", "--no-check")
     assert done.returncode == 1
     (estimate,) = json.loads(done.stdout)
     assert estimate["status"] == "refused"
     assert "hardly rotates" in estimate["reason"]
+
+
+def test_a_critical_finding_is_printed_first_and_exits_3(hecbench, tmp_path):
+    """Inverted robot poses: most methods give an answer, which is not to be used."""
+    good = conformance.rig(np.random.default_rng(1), Mounting.EYE_TO_HAND, noise=1e-3).without_truth()
+    inverted = replace(good, base_T_flange=se3.inverse(good.base_T_flange))
+    recording_io.save(inverted, tmp_path / "cell")
+    done = hecbench("solve", tmp_path / "cell", "--solver", "shah", "--json")
+    assert done.returncode == 3
+    assert json.loads(done.stdout)[0]["solver"] == "shah"
+    assert "CRITICAL pose_direction_or_mounting" in done.stderr
+    text = hecbench("solve", tmp_path / "cell", "--solver", "shah").stdout
+    assert "DO NOT USE base_T_camera by shah" in text or "│ failed" in text
+    unchecked = hecbench("solve", tmp_path / "cell", "--solver", "shah", "--no-check")
+    assert "CRITICAL" not in unchecked.stderr
+    ran = hecbench("run", tmp_path / "cell", "--solver", "shah", "--out", tmp_path / "out")
+    assert ran.returncode == 3
+    assert "CRITICAL pose_direction_or_mounting" in ran.stderr
 
 
 def rewrite(cell, change):

@@ -53,7 +53,10 @@ def test_import_and_export(hecbench, refused, shared, tmp_path):
     refused(hecbench("import", easyhec, tmp_path / "x", "--urdf", tmp_path / "no.urdf"), "no.urdf")
     assert not (tmp_path / "x").exists()
 
-    assert hecbench("solve", tmp_path / "cell", "--solver", "shah", "--out", tmp_path).returncode == 0
+    assert (
+        hecbench("solve", tmp_path / "cell", "--solver", "shah", "--no-check", "--out", tmp_path).returncode
+        == 0
+    )
     estimate = tmp_path / "shah.json"
     line = hecbench("export", estimate, "--to", "ros", "--child", "camera_link")
     assert "static_transform_publisher" in line.stdout
@@ -79,7 +82,8 @@ def test_solve_detects_the_target_in_images(hecbench, shared):
     done = hecbench(
         "solve", shared / "data" / "visp_franka" / "data-eye-in-hand", "--solver", "park", "--json"
     )
-    assert done.returncode == 0, done.stderr
+    assert done.returncode == 3  # its target is larger than declared, which `check` finds
+    assert "CRITICAL target_scale" in done.stderr
     (estimate,) = json.loads(done.stdout)
     assert estimate["mounting"] == "eye_in_hand"
     assert estimate["diagnostics"]["target_spread_mm"] == pytest.approx(4.4, rel=0.1)

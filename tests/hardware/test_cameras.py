@@ -50,7 +50,7 @@ def test_folder_bad_input(tmp_path):
     with pytest.raises(InputError, match="holds no image"):
         camera("images", folder=tmp_path)
     (tmp_path / "torn.png").write_bytes(b"\x89PNG half")
-    with pytest.raises(DeviceFault, match="not a readable image"):
+    with pytest.raises(DeviceFault, match=r"torn.png: cannot be read as an image"):
         camera("images", folder=tmp_path).grab()
 
 

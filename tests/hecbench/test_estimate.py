@@ -8,7 +8,7 @@ import pytest
 from hecbench import estimate as module
 from hecbench import se3
 from hecbench.errors import InputError
-from hecbench.estimate import Estimate, Status, Termination, best_first
+from hecbench.estimate import Estimate, Status, Termination, best_first, ordering_metric
 from hecbench.recording import CameraModel, Mounting
 
 SCHEMA_KEYS = [
@@ -84,3 +84,31 @@ def test_best_first_prefers_prediction_then_error_then_any_answer():
     assert [e.solver for e in best_first([refused, bad, bare, good])] == ["good", "bad", "bare", "refused"]
     predicts = [Estimate(np.eye(4), solver=str(px), held_out={"reprojection_px": px}) for px in (2.0, 0.5)]
     assert [e.solver for e in best_first(predicts)] == ["0.5", "2.0"]
+
+
+def measured(solver, **sections):
+    return Estimate(np.eye(4), solver=solver, **sections)
+
+
+def test_one_metric_orders_all_methods():
+    """Pixels are never compared with millimetres, and no metric is taken that most answers lack."""
+    both = measured("both", held_out={"target_mm": 3.0, "reprojection_px": 0.1})
+    better = measured("better", held_out={"target_mm": 2.0, "reprojection_px": 0.9})
+    spread = measured("spread", diagnostics={"target_spread_mm": 0.1})
+    missing = Estimate(solver="missing", status=Status.FAILED, reason="r")
+    ordered = best_first([missing, spread, both, better])
+    assert [e.solver for e in ordered] == ["better", "both", "spread", "missing"]
+    assert ordering_metric(ordered).name == "target_mm"
+    alone = measured("alone", errors={"tre_mm": 1.0}, diagnostics={"target_spread_mm": 1.0})
+    many = [measured(f"m{i}", diagnostics={"target_spread_mm": 9.0 - i}) for i in range(3)]
+    assert [e.solver for e in best_first([*many, alone])] == ["alone", "m2", "m1", "m0"]
+
+
+def test_an_overlap_is_better_when_it_is_larger():
+    ordered = best_first([measured(str(iou), held_out={"mask_iou": iou}) for iou in (0.5, 0.9, 0.7)])
+    assert [e.solver for e in ordered] == ["0.9", "0.7", "0.5"]
+
+
+def test_without_any_metric_the_order_is_kept():
+    assert [e.solver for e in best_first([measured("b"), measured("a")])] == ["b", "a"]
+    assert ordering_metric([measured("a")]) is None

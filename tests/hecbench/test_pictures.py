@@ -122,7 +122,7 @@ def test_soft_edges_are_no_labels():
         (_file(RAMP.astype(np.uint16)), "end at 255 of 65535"),
         (_file(RAMP.astype(np.uint16) * 16, "TIFF"), "end at 4080 of 65535"),
         (_file(RAMP.astype(np.float32), "TIFF"), "floats from 0 to 255; scale them to 0..1"),
-        (np.full((4, 4, 3), np.nan), "floats from nan"),
+        (np.full((4, 4, 3), np.nan), "not finite"),
         (_file(RAMP.astype(np.int32) * 70000, "TIFF"), "save 8 or 16 bits"),
         (np.zeros((4, 4, 5), np.uint8), r"shape \(4, 4, 5\)"),
         (b"%!PS-Adobe-3.0 EPSF-3.0\n%%BoundingBox: 0 0 99 99\n{} loop\n", "none of PNG, JPEG"),

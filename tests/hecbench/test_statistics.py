@@ -66,3 +66,21 @@ def test_cluster_bootstrap_of_unequal_clusters_agrees_with_resampling_by_hand(rn
     low, high = np.percentile(means, [2.5, 97.5])
     assert found.value == pytest.approx(values.mean())
     assert (found.low, found.high) == pytest.approx((low, high), abs=0.08 * (high - low))
+
+
+def test_intervals_do_not_depend_on_the_order_of_the_values():
+    rng = np.random.default_rng(1)
+    values, clusters = rng.normal(0, 1, 40), np.repeat(np.arange(10), 4)
+    order = rng.permutation(40)
+    assert statistics.bootstrap(values, np.median) == statistics.bootstrap(values[order], np.median)
+    first = statistics.cluster_bootstrap(values, clusters)
+    assert first == statistics.cluster_bootstrap(values[order], clusters[order])
+
+
+@pytest.mark.parametrize("count", [1, 2, 4])
+def test_fewer_than_five_values_have_no_interval(count):
+    values = np.arange(count, dtype=float)
+    assert np.isnan(statistics.bootstrap(values).low)
+    assert np.isnan(statistics.cluster_bootstrap(np.repeat(values, 3), np.repeat(np.arange(count), 3)).high)
+    five = statistics.bootstrap(np.arange(5.0))
+    assert five.low < five.value < five.high

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
+from hecbench.lens import normalised
 from hecbench.recording import CameraModel
 from hecbench.se3 import Array
 from hecbench_hardware.lab.gl import Canvas
@@ -133,13 +134,13 @@ def _without_distortion(
     """The pinhole camera to draw with, and where each supersampled pixel of the real one lies in its picture."""
     assert camera.K is not None
     skewed = camera.K[0, 1] != 0
-    if not camera.distortion.any() and not skewed:
+    if camera.is_pinhole and not skewed:
         return _enlarged(camera, supersample), None
     import cv2
 
     u, v = np.meshgrid(np.arange(camera.width, dtype=float), np.arange(camera.height, dtype=float))
     pixels = np.column_stack([u.ravel(), v.ravel()])
-    rays = cv2.undistortPoints(pixels[:, None], camera.K, camera.distortion)[:, 0]
+    rays = normalised(camera, pixels)
     low, high = rays.min(0), rays.max(0)
     focal = supersample * camera.K[[0, 1], [0, 1]]
     width, height = (int(side) for side in np.ceil((high - low) * focal) + 3)

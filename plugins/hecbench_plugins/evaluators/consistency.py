@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.estimate import Estimate
+from hecbench.lens import normalised
 from hecbench.recording import CameraModel, Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Column, EvaluatorSpec, Need, ResultSection
@@ -84,10 +85,7 @@ def reconstruction_errors_m(parent_T_camera: Array, recording: Recording) -> Arr
 
 def _rays(camera: CameraModel, pixels: Array) -> Array:
     """Unit directions (M, 3) in the camera's frame of pixels (M, 2)."""
-    import cv2
-
-    undistorted = cv2.undistortPoints(pixels[:, None], camera.K, camera.distortion)[:, 0]
-    rays = np.c_[undistorted, np.ones(len(undistorted))]
+    rays = np.c_[normalised(camera, pixels), np.ones(len(pixels))]
     return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
 
 

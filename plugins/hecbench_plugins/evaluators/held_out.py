@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from hecbench import se3, statistics
 from hecbench.estimate import Estimate, Status
-from hecbench.recording import Recording
+from hecbench.lens import same
+from hecbench.recording import CameraModel, Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Column, EvaluatorSpec, Need, ResultSection
-from hecbench_plugins.markers.target_poses import project
+from hecbench_plugins.markers.target_poses import project, target_poses
 
 Array = NDArray[np.float64]
 
@@ -33,8 +34,8 @@ def held_out(
 
     X is the solver's on the training folds. The ruler itself refits Y = carrier_T_target there with the raw
     robot poses, identically for every solver, and predicts ``inverse(X) @ H @ Y`` for the left-out samples. A
-    fold on which the solver gives no answer is counted in `failed_folds` and predicts nothing. Pixels are predicted
-    with the camera of the estimate: the recording's, unless the solver calibrates intrinsics too.
+    fold on which the solver gives no answer is counted in `failed_folds` and predicts nothing. A solver that changes
+    the intrinsics is judged with its own camera: pixels are predicted by it, and what it saw is computed again by it.
     """
     hand = recording.hand_poses()
     assert recording.camera_T_target is not None
@@ -51,7 +52,7 @@ def held_out(
             failed += 1
             continue
         assert fitted.parent_T_camera is not None
-        seen_by = replace(recording, camera=fitted.camera or recording.camera)
+        seen_by = _seen_by(fitted.camera or recording.camera, recording)
         carrier_T_target = refit_target(fitted.parent_T_camera, seen_by.subset(training))
         residuals += [_residuals(fitted.parent_T_camera, carrier_T_target, seen_by, i) for i in fold.tolist()]
     found: dict[str, Any] = {"folds": len(folds), "failed_folds": failed, "samples": len(residuals)}
@@ -61,9 +62,19 @@ def held_out(
         if np.isfinite(values).all():
             rms = statistics.bootstrap(values, statistics.root_mean_square)
             found[name] = rms.value
-            found[f"{name}_interval"] = [rms.low, rms.high]
+            if np.isfinite(rms.low):
+                found[f"{name}_interval"] = [rms.low, rms.high]
             found[f"{name}_median"] = float(np.median(values))
     return found
+
+
+def _seen_by(camera: CameraModel | None, recording: Recording) -> Recording:
+    """The recording as another camera sees it: the same corners, the target poses that follow from them with it."""
+    known = recording.camera
+    if camera is None or known is None or not _has_pixels(recording) or same(camera, known):
+        return recording
+    other = replace(recording, camera=camera, camera_T_target=None)
+    return replace(other, camera_T_target=target_poses(other))
 
 
 def refit_target(parent_T_camera: Array, recording: Recording) -> Array:

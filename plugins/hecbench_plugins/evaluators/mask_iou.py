@@ -83,11 +83,9 @@ def of_left_out_views(
     if not found:
         return counts
     mean = statistics.bootstrap(found, np.mean)
-    return counts | {
-        "mask_iou": mean.value,
-        "mask_iou_interval": [mean.low, mean.high],
-        "mask_iou_median": float(np.median(found)),
-    }
+    if np.isfinite(mean.low):
+        counts["mask_iou_interval"] = [mean.low, mean.high]
+    return counts | {"mask_iou": mean.value, "mask_iou_median": float(np.median(found))}
 
 
 def of_masks(

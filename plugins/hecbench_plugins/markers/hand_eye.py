@@ -23,6 +23,8 @@ from hecbench_plugins.markers.target_poses import target_poses
 Array = NDArray[np.float64]
 
 MINIMUM_SAMPLES = 3
+_MOST_COMPARED = 400
+"""Samples whose motions are all formed: their number, and OpenCV's time, grow with the square."""
 MINIMUM_ROTATION_DEG = 1.0
 """Rms rotation that must remain about a second axis, ten times a good robot's noise, or nothing is
 observable.
@@ -49,12 +51,18 @@ class PosedSamples:
         return PosedSamples(self.hand[indices], self.camera_T_target[indices])
 
     @cached_property
+    def compared(self) -> PosedSamples:
+        """The samples whose motions are formed: these, or 400 evenly spread ones of more."""
+        if len(self) <= _MOST_COMPARED:
+            return self
+        return self.subset(np.linspace(0, len(self) - 1, _MOST_COMPARED).astype(int))
+
+    @cached_property
     def motions(self) -> tuple[Array, Array]:
-        """A and B, each (N (N - 1) / 2, 4, 4), for all pairs i < j, with ``A X = X B``."""
-        i, j = np.triu_indices(len(self), 1)
-        A = self.hand[j] @ se3.inverse(self.hand[i])
-        B = self.camera_T_target[j] @ se3.inverse(self.camera_T_target[i])
-        return A, B
+        """A and B, each (M (M - 1) / 2, 4, 4), for all pairs i < j of the M compared, with ``A X = X B``."""
+        hand, seen = self.compared.hand, self.compared.camera_T_target
+        i, j = np.triu_indices(len(hand), 1)
+        return hand[j] @ se3.inverse(hand[i]), seen[j] @ se3.inverse(seen[i])
 
     @cached_property
     def rotation_logs(self) -> tuple[Array, Array]:
@@ -153,6 +161,7 @@ def answer(
     offsets = carrier_T_targets[:, :3, 3] - carrier_T_targets[:, :3, 3].mean(0)
     evidence = {
         "samples": len(pairs),
+        "samples_compared": len(pairs.compared),
         "target_spread_deg": spread_deg,
         "target_spread_mm": float(1e3 * np.sqrt((offsets**2).sum(1).mean())),
         "rotation_diversity_deg": rotation_diversity_deg(pairs.rotation_logs[0]).tolist(),

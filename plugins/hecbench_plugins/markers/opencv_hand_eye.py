@@ -18,14 +18,14 @@ Array = NDArray[np.float64]
 
 
 def hand_eye(pairs: PosedSamples, method: int) -> Array:
-    """X (4, 4) by one of cv2.CALIB_HAND_EYE_*.
+    """X (4, 4) by one of cv2.CALIB_HAND_EYE_*, on the motions between the samples compared.
 
     Raises:
         Refusal: OpenCV gave nothing finite.
     """
     import cv2
 
-    G, C = se3.inverse(pairs.hand), pairs.camera_T_target
+    G, C = se3.inverse(pairs.compared.hand), pairs.compared.camera_T_target
     try:
         rotation, translation = cv2.calibrateHandEye(*_split(G), *_split(C), method=method)
     except cv2.error as error:
@@ -72,6 +72,7 @@ def without_half_turns(pairs: PosedSamples) -> PosedSamples:
     Raises:
         Refusal: what is left does not determine X.
     """
+    pairs = pairs.compared
     angles = np.rad2deg(np.linalg.norm(pairs.rotation_logs, axis=-1))
     margin_deg = max(1.0, 6.0 * float(np.median(np.abs(angles[0] - angles[1]))))
     i, j = np.triu_indices(len(pairs), 1)

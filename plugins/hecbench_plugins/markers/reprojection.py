@@ -1,4 +1,4 @@
-"""What the reprojection solvers share: OpenCV's camera with its derivatives, the problem, and the start."""
+"""What the reprojection solvers share: the problem, and the start."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from hecbench.bundle.adjustment import Solution, adjust
 from hecbench.bundle.model import Noise, Problem, State, linearise, start
 from hecbench.errors import Refusal, SolverFailure
 from hecbench.estimate import Estimate
+from hecbench.lens import FixedSensor, Sensor, parameters_of
 from hecbench.recording import Recording
 from hecbench_plugins.markers import single3d
 from hecbench_plugins.markers.hand_eye import pose_pairs
@@ -25,21 +26,9 @@ DEFAULT_NOISE = Noise(0.3, float(np.deg2rad(0.05)), 5e-4)
 _STARTS = 2
 _EXPLAINS = 0.2
 """Of the target's motion in the image that may remain; good data leave a few per cent."""
+_MOST_VOTES = 400
+"""Poses compared each with each."""
 _AGREEING_RAD = np.deg2rad(8.0)
-
-
-def opencv_camera(points_c: Array, parameters: Array) -> tuple[Array, Array, Array]:
-    """Pixels (M, 2) of points (M, 3) m for parameters [fx, fy, cx, cy, distortion...], and the derivatives.
-
-    The derivative by a translation of the camera frame is the derivative by the point.
-    """
-    import cv2
-
-    fx, fy, cx, cy = parameters[:4]
-    K = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]])
-    pixels, derivatives = cv2.projectPoints(points_c, np.zeros(3), np.zeros(3), K, parameters[4:])
-    by_all = derivatives.reshape(len(points_c), 2, -1)
-    return pixels[:, 0], by_all[:, :, 3:6], by_all[:, :, 6 : 6 + len(parameters)]
 
 
 def corner_problem(recording: Recording, prior_sigmas: Array | None = None) -> Problem:
@@ -54,22 +43,21 @@ def corner_problem(recording: Recording, prior_sigmas: Array | None = None) -> P
         raise Refusal("needs corners_px, target and camera.K")
     assert recording.base_T_flange is not None
     usable = np.isfinite(recording.base_T_flange).all((1, 2)) & np.isfinite(corners_px).any((1, 2))
-    known = np.array([camera.K[0, 0], camera.K[1, 1], camera.K[0, 2], camera.K[1, 2], *camera.distortion])
-
-    def calibrated_camera(points_c: Array, parameters: Array) -> tuple[Array, Array, Array]:
-        pixels, by_point, by_parameter = opencv_camera(points_c, known)
-        return pixels, by_point, by_parameter[..., :0]
-
     problem = Problem(
         recording.mounting,
         recording.base_T_flange[usable],
         target.points_m,
         corners_px[usable],
-        calibrated_camera,
+        FixedSensor(camera),
     )
     if prior_sigmas is None:
         return problem
-    return replace(problem, sensor=opencv_camera, parameters=known, parameter_sigmas=prior_sigmas)
+    return replace(
+        problem,
+        sensor=Sensor(camera.distortion_model),
+        parameters=parameters_of(camera),
+        parameter_sigmas=prior_sigmas,
+    )
 
 
 def adjust_with_exact_robot(recording: Recording, problem: Problem) -> Solution:
@@ -127,6 +115,7 @@ def _by_shah(recording: Recording) -> Array:
 
 def _most_agreed(poses: Array) -> list[Array]:
     """Of poses (M, 4, 4), the one whose rotation most others share, and the best one unlike it."""
+    poses = poses[:: 1 + len(poses) // _MOST_VOTES]
     angles = se3.rotation_error_rad(poses[:, None], poses)
     loneliness = np.minimum(angles, _AGREEING_RAD).sum(1)
     first = int(loneliness.argmin())

@@ -10,9 +10,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import se3
+from hecbench import lens, se3
+from hecbench.bundle.pictures import refined
 from hecbench.errors import Refusal
+from hecbench.lens import FixedSensor, normalised
 from hecbench.recording import CameraModel, Recording
+from hecbench.targets import Target
 
 Array = NDArray[np.float64]
 
@@ -21,6 +24,9 @@ _PIXEL_SIGMA_PX = 0.5
 _ANGLE_SIGMA_RAD = np.deg2rad(1.0)
 _ROBUST_LIMIT = 25.0
 """A pair of samples costs at most (5 sigma)^2, so that one bad robot pose does not decide for the others."""
+_COMPARED = 60
+"""Samples whose poses are chosen by all their pairs; any others are chosen against these, so that time grows with
+their number only."""
 
 
 def target_poses(recording: Recording) -> Array:
@@ -59,44 +65,44 @@ def planar_candidates(recording: Recording) -> tuple[Array, Array]:
         )
     poses = np.full((len(recording), 2, 4, 4), np.nan)
     errors_px = np.full((len(recording), 2), np.nan)
-    for i, corners_px in enumerate(corners):
-        seen = np.isfinite(corners_px).all(1)
-        if seen.sum() >= MINIMUM_POINTS:
-            found = _pnp(target.points_m[seen], corners_px[seen], camera, target.is_planar)
-            for k in range(2 if found else 0):
-                poses[i, k], errors_px[i, k] = found[min(k, len(found) - 1)]
+    ideal = normalised(camera, corners)
+    found = [(i, pose) for i in range(len(recording)) for pose in _starts(target, ideal[i])]
+    if not found:
+        return poses, errors_px
+    owners = np.array([i for i, _ in found])
+    refined_poses, refined_px = refined(
+        np.array([pose for _, pose in found]), target.points_m, corners[owners], FixedSensor(camera)
+    )
+    for i in np.unique(owners).tolist():
+        own = np.flatnonzero((owners == i) & np.isfinite(refined_px))
+        own = own[np.argsort(refined_px[own], kind="stable")]
+        if len(own):
+            best_first = own[[0, min(1, len(own) - 1)]]
+            poses[i], errors_px[i] = refined_poses[best_first], refined_px[best_first]
     return poses, errors_px
 
 
 def project(camera: CameraModel, camera_T_target: Array, points_m: Array) -> Array:
-    """Pixels (P, 2) of target points (P, 3) m, with the camera's distortion."""
+    """Pixels (P, 2) of target points (P, 3) m, with the camera's distortion; NaN behind the camera."""
+    return lens.project(camera, se3.transform_points(camera_T_target, points_m))
+
+
+def _starts(target: Target, ideal: Array) -> list[Array]:
+    """camera_T_target from ideal normalised coordinates (P, 2): up to two for a planar target, else one."""
     import cv2
 
-    rotvec, translation = se3.so3_log(camera_T_target[:3, :3]), camera_T_target[:3, 3]
-    pixels, _ = cv2.projectPoints(points_m, rotvec, translation, camera.K, camera.distortion)
-    return np.asarray(pixels[:, 0])
-
-
-def _pnp(points_m: Array, corners_px: Array, camera: CameraModel, planar: bool) -> list[tuple[Array, float]]:
-    """Refined (camera_T_target, rms reprojection error px), best first: up to two for a planar target, else
-    one.
-    """
-    import cv2
-
-    method = cv2.SOLVEPNP_IPPE if planar else cv2.SOLVEPNP_SQPNP
-    intrinsics = camera.K, camera.distortion
+    seen = np.isfinite(ideal).all(1)
+    if seen.sum() < MINIMUM_POINTS:
+        return []
+    method = cv2.SOLVEPNP_IPPE if target.is_planar else cv2.SOLVEPNP_SQPNP
     try:
-        _, rotvecs, translations, _ = cv2.solvePnPGeneric(points_m, corners_px, *intrinsics, flags=method)
+        _, rotvecs, translations, _ = cv2.solvePnPGeneric(
+            target.points_m[seen], ideal[seen], np.eye(3), None, flags=method
+        )
     except cv2.error:  # collinear points have no pose: the sample counts as not seen
         return []
-    found = []
-    for rotvec, translation in zip(rotvecs, translations, strict=True):
-        rotvec, translation = cv2.solvePnPRefineLM(points_m, corners_px, *intrinsics, rotvec, translation)
-        camera_T_target = se3.from_rotvec(rotvec[:, 0], translation[:, 0])
-        if np.isfinite(camera_T_target).all() and camera_T_target[2, 3] > 0:
-            residuals_px = project(camera, camera_T_target, points_m) - corners_px
-            found.append((camera_T_target, float(np.sqrt((residuals_px**2).sum(1).mean()))))
-    return sorted(found, key=lambda pose_and_error: pose_and_error[1])
+    poses = [se3.from_rotvec(r[:, 0], t[:, 0]) for r, t in zip(rotvecs, translations, strict=True)]
+    return [pose for pose in poses if np.isfinite(pose).all() and pose[2, 3] > 0]
 
 
 def choose_by_motion(hand: Array, candidates: Array, misfit: Array) -> NDArray[np.int64]:
@@ -104,7 +110,7 @@ def choose_by_motion(hand: Array, candidates: Array, misfit: Array) -> NDArray[n
 
     Minimises the sum over pairs of the squared difference of rotation angles, each limited, plus the
     reprojection errors: coordinate descent from the best-reprojecting choice and from the choice that agrees
-    best with each single candidate.
+    best with each single candidate. Of many samples 60, evenly spaced, are chosen so, the others against them.
 
     Args:
         hand: H (N, 4, 4) m.
@@ -114,8 +120,18 @@ def choose_by_motion(hand: Array, candidates: Array, misfit: Array) -> NDArray[n
     Returns:
         (N,) of 0 or 1.
     """
-    count = len(hand)
-    pair_cost = _motion_costs(hand, candidates)
+    some = np.unique(np.linspace(0, len(hand) - 1, min(len(hand), _COMPARED)).astype(int))
+    pair_cost = _motion_costs(hand, candidates, some)
+    chosen = _chosen_together(misfit[some], pair_cost[some])
+    costs = misfit + pair_cost[:, :, np.arange(len(some)), chosen].sum(2)
+    choice = costs.argmin(1)
+    choice[some] = chosen
+    return np.asarray(choice)
+
+
+def _chosen_together(misfit: Array, pair_cost: Array) -> NDArray[np.int64]:
+    """The choices (N,) that minimise misfit (N, 2) plus the costs (N, 2, N, 2) of all pairs."""
+    count = len(misfit)
     each = np.arange(count)
     starts = [np.zeros(count, int), *(pair_cost[i, k].argmin(1) for i in range(count) for k in range(2))]
 
@@ -135,23 +151,25 @@ def choose_by_motion(hand: Array, candidates: Array, misfit: Array) -> NDArray[n
             choice[best] = 1 - choice[best]
         return choice
 
-    return min((descend(start) for start in starts), key=energy)
+    distinct = np.unique(np.array(starts), axis=0)
+    return min((descend(start) for start in distinct), key=energy)
 
 
-def _motion_costs(hand: Array, candidates: Array) -> Array:
-    """(N, 2, N, 2): squared difference of the angles by which hand and target turn between samples, limited."""
-    count = len(hand)
-    hand_angles = _pairwise_angles(hand[:, :3, :3])
-    target_angles = _pairwise_angles(candidates[..., :3, :3].reshape(2 * count, 3, 3)).reshape(
-        count, 2, count, 2
-    )
+def _motion_costs(hand: Array, candidates: Array, others: NDArray[np.int64]) -> Array:
+    """(N, 2, M, 2): squared difference of the angles by which hand and target turn from M others, limited."""
+    count, compared = len(hand), len(others)
+    hand_angles = _angles_between(hand[:, :3, :3], hand[others, :3, :3])
+    rotations = candidates[..., :3, :3]
+    target_angles = _angles_between(
+        rotations.reshape(2 * count, 3, 3), rotations[others].reshape(2 * compared, 3, 3)
+    ).reshape(count, 2, compared, 2)
     difference = (target_angles - hand_angles[:, None, :, None]) / _ANGLE_SIGMA_RAD
     costs = np.minimum(difference**2, _ROBUST_LIMIT)
-    costs[np.arange(count), :, np.arange(count), :] = 0.0
+    costs[others, :, np.arange(compared), :] = 0.0
     return np.asarray(costs)
 
 
-def _pairwise_angles(rotations: Array) -> Array:
-    """Angles (M, M) rad between rotations (M, 3, 3)."""
-    flat = rotations.reshape(len(rotations), 9)
-    return np.asarray(np.arccos(np.clip((flat @ flat.T - 1) / 2, -1, 1)))
+def _angles_between(first: Array, second: Array) -> Array:
+    """Angles (M, K) rad from rotations (M, 3, 3) to rotations (K, 3, 3)."""
+    traces = first.reshape(len(first), 9) @ second.reshape(len(second), 9).T
+    return np.asarray(np.arccos(np.clip((traces - 1) / 2, -1, 1)))

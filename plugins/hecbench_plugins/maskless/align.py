@@ -110,6 +110,8 @@ class ContourEquations:
     """(N,) share of each view's contour points whose posterior is narrow and centred."""
     view_judged: NDArray[np.int64]
     """(N,) contour points of each view that the image could judge."""
+    view_rms_px: Array
+    """(N,) rms distance from each view's drawn contour to where its image shows it sharply; NaN where nowhere."""
 
     @property
     def confirmed_share(self) -> float:
@@ -196,9 +198,9 @@ class ContourMatcher:
             radius_m,
             lambda buffers, view, count: self._compared(buffers, view, count, spacing, extra[view]),
         )
-        A, b, squares, used, sharp, judged = (np.array(column) for column in zip(*rows, strict=True))
+        A, b, squares, used, sharp, judged, rms = (np.array(column) for column in zip(*rows, strict=True))
         return ContourEquations(
-            A.sum(0), b.sum(0), A, b, float(squares.sum()), int(used.sum()), sharp, judged
+            A.sum(0), b.sum(0), A, b, float(squares.sum()), int(used.sum()), sharp, judged, rms
         )
 
     def learn(self, camera_T_parent: Array, spacing: float) -> None:
@@ -284,7 +286,7 @@ class ContourMatcher:
 
     def _compared(
         self, buffers: _Buffers, view: int, count: int, spacing: float, twists: Array
-    ) -> tuple[Array, Array, float, int, float, int]:
+    ) -> tuple[Array, Array, float, int, float, int, float]:
         A, b = np.zeros((6 + len(twists),) * 2), np.zeros(6 + len(twists))
         kernels.line_posteriors(
             buffers.contour,
@@ -326,10 +328,11 @@ class ContourMatcher:
             b,
         )
         judged = buffers.variance[:count] >= 0
-        sharp = (
-            judged & (buffers.variance[:count] < _SHARP_PX**2) & (np.abs(buffers.mean[:count]) < _CENTRED_PX)
-        )
-        return A, b, squares, used, float(sharp.sum() / max(judged.sum(), 1)), int(judged.sum())
+        sharp = judged & (buffers.variance[:count] < _SHARP_PX**2)
+        off_px = np.abs(buffers.mean[:count][sharp])
+        rms_px = float(np.sqrt((off_px**2).mean())) if len(off_px) else np.nan
+        share = float((off_px < _CENTRED_PX).sum() / max(judged.sum(), 1))
+        return A, b, squares, used, share, int(judged.sum()), rms_px
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hecbench.errors import InputError, Refusal
-from hecbench.recording import CameraModel, Recording
+from hecbench.recording import EQUIDISTANT, CameraModel, Recording
 from hecbench.rendering.undistort import shrunk_intrinsics
 from hecbench.robots.posed import PosedRobot
 from hecbench_plugins import threads
@@ -102,15 +103,16 @@ def _lens(
     import cv2
 
     assert camera.K is not None
-    pad = PAD_PX if camera.distortion.any() else 0
+    pad = 0 if camera.is_pinhole else PAD_PX
     width, height = (-(-(size + 2 * pad) // _GRID) * _GRID for size in (camera.width, camera.height))
     K = camera.K.copy()
     K[:2, 2] += pad
     if camera.K[0, 1] != 0:
         raise InputError("camera.K: has skew, which the undistortion of photographs does not support")
-    across, down = cv2.initUndistortRectifyMap(
-        camera.K, camera.distortion, None, K, (width, height), cv2.CV_32FC1
-    )
+    fisheye = camera.distortion_model == EQUIDISTANT
+    rectify: Any = cv2.fisheye.initUndistortRectifyMap if fisheye else cv2.initUndistortRectifyMap
+    coefficients = camera.distortion if len(camera.distortion) else np.zeros(4)
+    across, down = rectify(camera.K, coefficients, np.eye(3), K, (width, height), cv2.CV_32FC1)
     valid = (across >= 0) & (down >= 0) & (across <= camera.width - 1) & (down <= camera.height - 1)
     return (across, down), K, valid
 

@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.errors import InputError, Refusal
+from hecbench.lens import undistort
 from hecbench.recording import CameraModel, Recording
 from hecbench.rendering import Renderer
-from hecbench.rendering.undistort import distort, shrunk_intrinsics
+from hecbench.rendering.undistort import shrunk_intrinsics
 from hecbench_plugins.views.pyramid import meshes_by_level, photographed_robot
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
-_UNDISTORT_ROUNDS = 20
-_UNDISTORT_PX = 0.05
 _WIDEST = 3.0
 """Largest side of the drawn canvas over that of the image."""
 
@@ -85,7 +84,7 @@ class Uncertainty:
 def _shrunk(camera: CameraModel, shrink: int) -> CameraModel:
     assert camera.K is not None
     K = shrunk_intrinsics(camera.K, 1 / shrink)
-    return CameraModel(camera.width // shrink, camera.height // shrink, K, camera.distortion)
+    return replace(camera, width=camera.width // shrink, height=camera.height // shrink, K=K)
 
 
 def _canvas(camera: CameraModel) -> tuple[tuple[NDArray[np.intp], NDArray[np.intp]] | None, Array, int, int]:
@@ -96,11 +95,12 @@ def _canvas(camera: CameraModel) -> tuple[tuple[NDArray[np.intp], NDArray[np.int
     """
     assert camera.K is not None
     width, height = camera.width, camera.height
-    if not camera.distortion.any():
+    if camera.is_pinhole:
         return None, camera.K, width, height
     v, u = np.mgrid[0:height, 0:width].astype(float)
     rays = np.stack([u, v, np.ones_like(u)], -1) @ np.linalg.inv(camera.K).T
-    ideal = _undistorted(rays[..., :2], camera) @ camera.K[:2, :2].T + camera.K[:2, 2]
+    ideal = undistort(rays[..., :2], camera) @ camera.K[:2, :2].T + camera.K[:2, 2]
+    ideal = np.nan_to_num(ideal, nan=np.inf)
     size = np.array([width, height])
     margin = (_WIDEST - 1) / 2 * size
     low = np.floor(np.maximum(ideal.min((0, 1)), -margin)).astype(int)
@@ -109,14 +109,3 @@ def _canvas(camera: CameraModel) -> tuple[tuple[NDArray[np.intp], NDArray[np.int
     K = camera.K.copy()
     K[:2, 2] -= low
     return (place[..., 1], place[..., 0]), K, int(high[0] - low[0] + 1), int(high[1] - low[1] + 1)
-
-
-def _undistorted(points: Array, camera: CameraModel) -> Array:
-    """Ideal normalised coordinates of distorted ones, by fixed-point steps; where these diverge, off the canvas."""
-    assert camera.K is not None
-    found = points.copy()
-    for _ in range(_UNDISTORT_ROUNDS):
-        found -= distort(found, camera.distortion) - points
-    off_px = np.abs(distort(found, camera.distortion) - points).max(-1) * camera.K[0, 0]
-    found[~(off_px < _UNDISTORT_PX)] = np.inf
-    return found

@@ -10,6 +10,7 @@ from hecbench_plugins.evaluators.truth import errors
 from hecbench import preparation, se3
 from hecbench.estimate import Estimate, Status
 from hecbench.storage import recording_io
+from hecbench.workspace import points_in_parent
 
 
 def truth(recording):
@@ -118,3 +119,54 @@ def test_real_recording(shared):
     recording = recording_io.load(shared / "data" / "ur3e_cam1")
     found = predict(preparation.prepare(recording).without_truth(), truth(recording))
     assert found["reprojection_px"] == pytest.approx(0.65, abs=0.1)
+
+
+def with_focal(camera, factor):
+    K = camera.K.copy()
+    K[[0, 1], [0, 1]] *= factor
+    return replace(camera, K=K)
+
+
+def test_the_pair_error_is_the_tre_where_the_camera_is_the_recordings(exact_rig, rng):
+    estimated = se3.exp(rng.normal(0, 0.01, 6)) @ truth(exact_rig)
+    found = measure(exact_rig, estimated)
+    assert found["pair_tre_mm"] == pytest.approx(found["tre_mm"])
+
+
+def test_the_pair_error_of_a_moved_camera(exact_rig):
+    """A longer focal length at the true pose draws every point towards the optical axis, at its own depth."""
+    camera = with_focal(exact_rig.camera, 1.05)
+    found = errors(Estimate(truth(exact_rig), camera=camera), exact_rig, solve=None, rng=None)
+    assert found["tre_mm"] < 1e-9
+    points_m = points_in_parent(exact_rig.base_T_flange, exact_rig.mounting == "eye_in_hand")
+    seen = se3.transform_points(se3.inverse(truth(exact_rig)), points_m)
+    pixels = seen @ exact_rig.camera.K.T
+    pixels = pixels[:, :2] / pixels[:, 2:]
+    size = exact_rig.camera.width - 1, exact_rig.camera.height - 1
+    inside = (seen[:, 2] > 0) & ((pixels >= 0) & (pixels <= size)).all(1)
+    lateral = (1 - 1 / 1.05) * np.linalg.norm(seen[inside, :2], axis=1)
+    assert found["pair_tre_mm"] == pytest.approx(1e3 * np.sqrt((lateral**2).mean()), rel=1e-6)
+
+
+def test_a_camera_that_came_with_the_answer_sees_the_target_again(exact_rig):
+    """A recording with a wrong focal length: millimetres are measured with the camera that made the answer."""
+    wrong = replace(
+        exact_rig.without_truth(), camera=with_focal(exact_rig.camera, 1.03), camera_T_target=None
+    )
+    wrong = preparation.prepare(wrong)
+    X = truth(exact_rig)
+    own = held_out(
+        Estimate(X),
+        wrong,
+        solve=lambda _: Estimate(X, camera=exact_rig.camera),
+        rng=np.random.default_rng(0),
+    )
+    theirs = held_out(Estimate(X), wrong, solve=lambda _: Estimate(X), rng=np.random.default_rng(0))
+    assert own["target_mm"] < 0.01
+    assert own["reprojection_px"] < 0.01
+    assert theirs["target_mm"] > 1
+
+
+def test_no_interval_of_few_samples(exact_rig):
+    few = exact_rig.subset(range(4))
+    assert "target_mm_interval" not in predict(few, truth(exact_rig))

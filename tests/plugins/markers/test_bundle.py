@@ -1,18 +1,18 @@
-"""Reprojection bundle adjustment: OpenCV's camera, planar flips, covariance, intrinsics, and the real arm."""
+"""Reprojection bundle adjustment: planar flips, covariance, intrinsics, and the real arm."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from hecbench_datasets.synthetic_markers import PRESETS, generate, make
-from hecbench_plugins.markers.reprojection import corner_problem, opencv_camera
+from hecbench_plugins.markers.reprojection import corner_problem
 from hecbench_plugins.solvers.bundle import Bundle, IntrinsicsPrior
 from hecbench_plugins.solvers.bundle_fixed import bundle_fixed
 
 from hecbench import se3
 from hecbench.conformance import rig
 from hecbench.errors import Refusal, SolverFailure
-from hecbench.recording import DISTORTION_LENGTHS, Mounting
+from hecbench.recording import Mounting
 from hecbench.storage import recording_io
 from hecbench.targets import ChessboardTarget
 
@@ -29,28 +29,6 @@ def errors(estimate, recording):
         float(se3.translation_error_m(estimate.parent_T_camera, X)),
         float(se3.rotation_error_rad(estimate.parent_T_camera, X)),
     )
-
-
-@pytest.mark.parametrize("length", DISTORTION_LENGTHS)
-def test_camera_derivatives(length, rng):
-    points = rng.uniform([-0.3, -0.3, 1.0], [0.3, 0.3, 2.0], (20, 3))
-    parameters = np.concatenate([[900.0, 920.0, 640.0, 350.0], rng.uniform(-0.05, 0.05, length)])
-    _, by_point, by_parameter = opencv_camera(points, parameters)
-    step = 1e-6
-    for k in range(3):
-        shift = step * np.eye(3)[k]
-        ahead, behind = (
-            opencv_camera(points + shift, parameters)[0],
-            opencv_camera(points - shift, parameters)[0],
-        )
-        np.testing.assert_allclose(by_point[..., k], (ahead - behind) / (2 * step), atol=2e-4)
-    for k in range(len(parameters)):
-        shift = step * np.eye(len(parameters))[k]
-        ahead, behind = (
-            opencv_camera(points, parameters + shift)[0],
-            opencv_camera(points, parameters - shift)[0],
-        )
-        np.testing.assert_allclose(by_parameter[..., k], (ahead - behind) / (2 * step), atol=2e-4)
 
 
 @pytest.mark.parametrize("level", KNOWN)

@@ -1,0 +1,67 @@
+"""Options that several verbs have."""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+if TYPE_CHECKING:
+    from hecbench.running.solving import Options
+
+as_json = click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else.")
+seed = click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+solvers = click.option(
+    "--solver",
+    "solvers",
+    multiple=True,
+    metavar="NAME",
+    help="Repeatable; NAME[OPTION=VALUE,...] sets options of it; default: all that can.",
+)
+unknown = click.option(
+    "--unknown",
+    type=click.Choice(["joints", "scale", "focal"]),
+    multiple=True,
+    help="Solve for this too, by every solver with the option `unknown`; repeatable.",
+)
+segmenter = click.option(
+    "--segmenter", metavar="NAME", help="Whose masks of the robot are used; default: those of the recording."
+)
+FOLDER = click.Path(path_type=Path, file_okay=False)
+FILE = click.Path(path_type=Path, dir_okay=False)
+ANY_PATH = click.Path(path_type=Path)
+held_out = click.option(
+    "--held-out/--no-held-out",
+    default=None,
+    help="Predict left-out samples; default: where truth is not given.",
+)
+check = click.option(
+    "--check/--no-check",
+    "check",
+    default=True,
+    help="Look for faults in the recording first; a critical one exits with 3.",
+)
+timeout = click.option(
+    "--timeout",
+    "timeout_s",
+    type=click.FloatRange(min=0, min_open=True),
+    metavar="S",
+    help="Seconds that a solver may take each time it is called; default: no limit.",
+)
+
+
+def run_options(
+    seed: int,
+    held_out: bool | None = None,
+    segmenter: str | None = None,
+    timeout_s: float | None = None,
+) -> Options:
+    """What holds for a whole run, with the command line that makes it again."""
+    from hecbench.running.solving import Options
+
+    words = ["hecbench", *(word for word in sys.argv[1:] if word != "--resume")]
+    command = shlex.join(words)
+    return Options(seed, held_out, command=command, segmenter=segmenter, timeout_s=timeout_s)

@@ -1,0 +1,98 @@
+"""How well the photographs confirm the robot's contour: the ruler for recordings with neither a target nor masks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hecbench import se3, statistics
+from hecbench.estimate import Estimate, Status
+from hecbench.recording import Recording
+from hecbench.registry import hookimpl
+from hecbench.specs import Column, EvaluatorSpec, Need, ResultSection
+
+Array = NDArray[np.float64]
+
+FOLDS = 5
+_NEEDS = frozenset({Need.IMAGES, Need.ROBOT_MODEL, Need.JOINTS, Need.INTRINSICS})
+_FEWEST_SAMPLES = 6
+"""A search without a start needs five photographs."""
+
+
+def of_left_out_photographs(
+    estimate: Estimate,
+    recording: Recording,
+    *,
+    solve: Callable[[Recording], Estimate],
+    rng: np.random.Generator,
+) -> Mapping[str, Any]:
+    """The contour drawn in left-out photographs at the pose solved from the others, 5-fold.
+
+    `contour_px` is the rms, over photographs, of the distance between the drawn contour and the place where the image
+    has it; `confirmed` the mean share of the contour that the image confirms. A fold on which the solver gives no
+    answer is counted in `failed_folds` and predicts nothing.
+    """
+    photographed = [i for i, image in enumerate(recording.images or ()) if image is not None]
+    folds = np.array_split(rng.permutation(photographed), min(FOLDS, len(photographed)))
+    rows: list[Array] = []
+    failed = 0
+    for fold in folds:
+        fitted = solve(recording.subset([i for i in photographed if i not in fold]))
+        if fitted.status is not Status.OK:
+            failed += 1
+            continue
+        rows.append(agreement(recording.subset(np.sort(fold)), fitted))
+    counts: dict[str, Any] = {"folds": len(folds), "failed_folds": failed}
+    if not rows:
+        return counts | {"samples": 0}
+    distance_px, share = np.concatenate(rows).T
+    distance_px = distance_px[np.isfinite(distance_px)]
+    counts |= {"samples": len(share), "confirmed": float(share.mean())}
+    if not len(distance_px):
+        return counts
+    rms = statistics.bootstrap(distance_px, statistics.root_mean_square)
+    if np.isfinite(rms.low):
+        counts["contour_px_interval"] = [rms.low, rms.high]
+    return counts | {
+        "contour_px": rms.value,
+        "contour_px_median": float(np.median(distance_px)),
+    }
+
+
+def agreement(recording: Recording, estimate: Estimate) -> Array:
+    """Rms distance of the contour, px, and the share confirmed (N, 2), for each photograph at an answer."""
+    from hecbench_plugins.maskless.align import schedule
+    from hecbench_plugins.maskless.solver import Photographs
+
+    assert estimate.parent_T_camera is not None
+    photographs = Photographs.of(recording)
+    _, last = schedule(photographs.canvas.valid.shape[1])
+    matcher = photographs.lines(last, photographs.canvas)
+    pose = se3.inverse(estimate.parent_T_camera)
+    matcher.learn(pose, last.spacing)
+    found = matcher(pose, last.spacing)
+    return np.column_stack([found.view_rms_px, found.view_confirmed_share])
+
+
+def _applies(recording: Recording) -> bool:
+    offers = recording.offers()
+    count = sum(image is not None for image in recording.images or ())
+    has_other_ruler = recording.camera_T_target is not None or Need.MASKS in offers
+    return offers >= _NEEDS and count >= _FEWEST_SAMPLES and not has_other_ruler
+
+
+@hookimpl
+def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
+    """This file's ruler."""
+    yield EvaluatorSpec(
+        name="contour_held_out",
+        summary="the robot's contour in left-out photographs, where there is neither a target nor a mask",
+        imports=("cv2",),
+        columns=(Column("contour_px", "px"), Column("confirmed", "", False)),
+        factory=lambda: of_left_out_photographs,
+        into=ResultSection.HELD_OUT,
+        applies=_applies,
+    )
