@@ -23,6 +23,7 @@ from hecbench.errors import HecbenchError
 @choices.held_out
 @choices.check
 @choices.timeout
+@choices.memory
 @click.option("--out", type=choices.FOLDER, help="Write each estimate to DIR/<solver>.json.")
 @choices.seed
 @choices.as_json
@@ -36,6 +37,7 @@ def solve(
     held_out: bool | None,
     check: bool,
     timeout_s: float | None,
+    memory_mb: int | None,
     out: Path | None,
     seed: int,
     as_json: bool,
@@ -52,7 +54,7 @@ def solve(
         raise HecbenchError(
             f"{recording}: no ready solver can use what it offers: {', '.join(sorted(loaded.offers()))}"
         )
-    options = choices.run_options(seed, held_out, segmenter, timeout_s)
+    options = choices.run_options(seed, held_out, segmenter, timeout_s, memory_mb)
     ready = preparation.prepare(loaded)
     prepared = preparation.segmented(ready, segmenter)
     for note in prepared.recording.notes:

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from hecbench import diagnose, registry
-from hecbench.errors import InputError
-from hecbench.estimate import Estimate
+from hecbench.estimate import Estimate, Status, Termination
 from hecbench.preparation import load_recording, prepare, segmented
 from hecbench.recording import Recording
+from hecbench.running import pool
+from hecbench.running.isolation import Ended
 from hecbench.running.solving import Options, each_solved, provenance
 from hecbench.specs import Kind, SolverSpec, SuiteSpec
 from hecbench.storage import evidence, store
@@ -124,30 +124,25 @@ def _executed(
     if executor is None and (jobs == 1 or len(tasks) < 2):
         yield from (execute(task, options) for task in tasks)
         return
-    from joblib import Parallel, delayed
+    running = (
+        pool.on_this_machine(execute, tasks, (options,), jobs)
+        if executor is None
+        else pool.on_cluster(execute, tasks, (options,), executor)
+    )
+    for task, result in running:
+        yield (_lost(task, options, str(result)), None) if isinstance(result, Ended) else result
 
-    with _backend(executor):
-        parallel = Parallel(n_jobs=jobs if executor is None else -1, return_as="generator_unordered")
-        yield from parallel(delayed(execute)(task, options) for task in tasks)
 
-
-@contextmanager
-def _backend(executor: str | None) -> Iterator[None]:
-    """joblib's own processes, or the workers of the dask scheduler at a URL."""
-    if executor is None:
-        yield
-        return
-    from joblib import parallel_config
-
-    try:
-        from distributed import Client
-
-        client = Client(executor, timeout="5s", set_as_default=False)
-    except ImportError:
-        raise InputError("--executor needs dask: pip install 'hecbench[cluster]'") from None
-    except (OSError, ValueError, TypeError) as error:
-        raise InputError(
-            f"--executor {executor}: no scheduler answers ({error}); give its tcp://host:port"
-        ) from error
-    with client, parallel_config(backend="dask", client=client):
-        yield
+def _lost(task: Task, options: Options, reason: str) -> list[Estimate]:
+    """The results of a task whose process died."""
+    ended = Estimate(
+        status=Status.FAILED,
+        reason=reason,
+        termination=Termination.STALLED,
+        recording=task.item,
+        suite=task.suite or "files",
+        level=task.level,
+        item=task.item,
+        provenance={"seed": options.seed, "masks": options.segmenter, "command": options.command},
+    )
+    return [replace(ended, solver=solver) for solver in task.solvers]
