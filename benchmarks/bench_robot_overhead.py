@@ -59,7 +59,7 @@ def seconds(action):
 @pytest.mark.parametrize("command", ["question", "motion"])
 def test_overhead_per_command(benchmark, client, robot, command):
     direct, driven = {
-        "question": (client.getTCPOffset, lambda: robot._request("call", "getTCPOffset")),
+        "question": (client.getTCPOffset, lambda: robot._control.request("call", "getTCPOffset")),
         "motion": (lambda: direct_move(client), lambda: robot.move_joints(HOME)),
     }[command]
     times_ms = []

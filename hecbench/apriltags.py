@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cache
 from importlib.util import find_spec
+from threading import get_ident
 from typing import Any
 
 import numpy as np
@@ -51,7 +52,7 @@ def detected(grey: NDArray[np.uint8], family: str, decimate: float = 1.0) -> lis
         return detected_by_opencv(grey, family, decimate)
     return [
         Tag(int(tag.tag_id), np.asarray(tag.corners, float) - 0.5, float(tag.decision_margin))
-        for tag in detector(family, decimate).detect(np.ascontiguousarray(grey))
+        for tag in detector(family, decimate, get_ident()).detect(np.ascontiguousarray(grey))
         if tag.hamming <= _MOST_WRONG_BITS and tag.decision_margin > _LEAST_MARGIN
     ]
 
@@ -82,8 +83,8 @@ def detected_by_opencv(grey: NDArray[np.uint8], family: str, decimate: float = 1
 
 
 @cache
-def detector(family: str, decimate: float) -> Any:
-    """A detector that lives until the process ends, and is never freed.
+def detector(family: str, decimate: float, thread: int) -> Any:
+    """A thread's own detector, which no two of them can use at once. It lives until the process ends, never freed.
 
     The library's own destructor frees the tag family before the detector that still uses it, which corrupts the heap.
     """

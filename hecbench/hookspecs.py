@@ -16,6 +16,7 @@ from hecbench.specs import (
     EvaluatorSpec,
     ExporterSpec,
     ObserverSpec,
+    PerceptionSpec,
     SegmenterSpec,
     SolverSpec,
     SuiteSpec,
@@ -306,6 +307,12 @@ def hecbench_translators() -> Iterable[TranslatorSpec]:
         yield TranslatorSpec(name="grey", summary="no colours", factory=lambda: grey)
     ```
     """
+    raise NotImplementedError
+
+
+@hookspec
+def hecbench_perception() -> Iterable[PerceptionSpec]:
+    """Trained networks that find a robot in photographs."""
     raise NotImplementedError
 
 

@@ -23,7 +23,8 @@ def load_recording(path: Path) -> Recording:
         InputError: nothing there, no adapter or several recognise it, or the adapter finds a fault.
     """
     adapters = registry.load().ready(Kind.DATASET, DatasetSpec)
-    found = [adapter for adapter in adapters if adapter.sniff(path)]
+    recognised = [adapter for adapter in adapters if adapter.sniff(path)]
+    found = [adapter for adapter in recognised if not adapter.last_resort] or recognised
     if not found and not path.exists():
         raise InputError(f"{path}: does not exist; give a recording's folder")
     if not found:

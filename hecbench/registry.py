@@ -21,7 +21,10 @@ import pluggy
 
 from hecbench import hookspecs
 from hecbench.errors import InputError
-from hecbench.specs import AnySpec, Kind, SolverSpec, Spec
+from hecbench.specs import AnySpec, ConfigurableSpec, Kind, SolverSpec, Spec
+
+_WITH_OPTIONS = (Kind.SOLVER, Kind.SEGMENTER, Kind.TRANSLATOR)
+"""Kinds whose specs are `ConfigurableSpec`."""
 
 hookimpl = pluggy.HookimplMarker(hookspecs.GROUP)
 
@@ -70,7 +73,7 @@ class Plugin:
     def _about(self) -> str:
         if self.spec is None:
             return ""
-        options = self.spec.options if isinstance(self.spec, SolverSpec) else ()
+        options = self.spec.options if isinstance(self.spec, ConfigurableSpec) else ()
         told = "".join(f"; [{option.name}=...]: {option.summary}" for option in options)
         return self.spec.summary + told
 
@@ -93,7 +96,7 @@ class Registry:
 
     def is_foreign(self, solver: str) -> bool:
         """Whether the solver of that name, options set in it or not, comes from another distribution than ours."""
-        plain, _ = _settings(solver)
+        plain, _ = _settings(Kind.SOLVER, solver)
         return any(
             plugin.kind is Kind.SOLVER and plugin.name == plain and plugin.distribution != OWN_DISTRIBUTION
             for plugin in self.plugins
@@ -102,9 +105,9 @@ class Registry:
     def get(self, kind: Kind, name: str, spec_type: type[AnySpecT]) -> AnySpecT:
         """The ready spec of that name; otherwise an `InputError` that says why not and what there is.
 
-        A solver's name may set options of it: ``name[option=value,...]``.
+        The name of a solver, segmenter or translator may set options of it: ``name[option=value,...]``.
         """
-        plain, settings = _settings(name) if kind is Kind.SOLVER else (name, {})
+        plain, settings = _settings(kind, name) if kind in _WITH_OPTIONS else (name, {})
         found = [plugin for plugin in self.select(kind) if plugin.name == plain]
         if not found:
             names = ", ".join(spec.name for spec in self.ready(kind, spec_type)) or "none"
@@ -112,7 +115,7 @@ class Registry:
         plugin = found[0]
         if plugin.status is not PluginStatus.READY or not isinstance(plugin.spec, spec_type):
             raise InputError(f"{kind} '{plain}' is {plugin.status}: {plugin.detail}")
-        return plugin.spec.configured(settings) if isinstance(plugin.spec, SolverSpec) else plugin.spec
+        return plugin.spec.configured(settings) if isinstance(plugin.spec, ConfigurableSpec) else plugin.spec
 
     def named(self, name: str, kind: str | None = None) -> AnySpec:
         """The ready spec of that name, of any kind; an `InputError` when plugins of several kinds have the name."""
@@ -126,14 +129,14 @@ class Registry:
         return cast("AnySpec", self.get(wanted, name, Spec))
 
 
-def _settings(name: str) -> tuple[str, dict[str, str]]:
-    """A solver's name and the options set in it: ``name[option=value,...]``."""
+def _settings(kind: Kind, name: str) -> tuple[str, dict[str, str]]:
+    """A plugin's name and the options set in it: ``name[option=value,...]``."""
     plain, bracket, rest = name.partition("[")
     if not bracket:
         return name, {}
     pairs = [setting.partition("=") for setting in rest.removesuffix("]").split(",")]
     if not rest.endswith("]") or not all(option and equals for option, equals, _ in pairs):
-        raise InputError(f"solver '{name}': write options as {plain or 'solver'}[option=value,option=value]")
+        raise InputError(f"{kind} '{name}': write options as {plain or kind}[option=value,option=value]")
     return plain, {option.strip(): value.strip() for option, _, value in pairs}
 
 

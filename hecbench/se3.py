@@ -12,6 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 
 _SMALL_ANGLE_RAD = 1e-4
+_ROUNDING = 1e-12
+"""Entries of R R^T - I below it come from rounding."""
 
 
 def make(rotation: ArrayLike, translation: ArrayLike) -> Array:
@@ -48,21 +50,61 @@ def hat(v: ArrayLike) -> Array:
 
 
 def so3_exp(rotvec: ArrayLike) -> Array:
-    """Rotation matrices (..., 3, 3) of rotation vectors (..., 3) rad."""
-    from scipy.spatial.transform import Rotation
-
-    rotvec = np.asarray(rotvec, float)
-    matrices = Rotation.from_rotvec(rotvec.reshape(-1, 3)).as_matrix()
-    return np.asarray(matrices.reshape(*rotvec.shape[:-1], 3, 3))
+    """Rotation matrices (..., 3, 3) of rotation vectors (..., 3) rad, by way of unit quaternions."""
+    half = np.asarray(rotvec, float) / 2
+    angle = np.linalg.norm(half, axis=-1, keepdims=True)
+    return _from_unit_quat(np.concatenate([half * np.sinc(angle / np.pi), np.cos(angle)], -1))
 
 
 def so3_log(rotation: ArrayLike) -> Array:
     """Rotation vectors (..., 3) rad, of angle at most pi, of rotation matrices (..., 3, 3)."""
-    from scipy.spatial.transform import Rotation
+    quaternion = _quat(rotation)
+    sine = np.linalg.norm(quaternion[..., :3], axis=-1, keepdims=True)
+    angle = 2 * np.arctan2(sine, quaternion[..., 3:])
+    return np.asarray(quaternion[..., :3] * np.where(sine > 0, angle / np.where(sine > 0, sine, 1.0), 2.0))
 
-    rotation = np.asarray(rotation, float)
-    rotvecs = Rotation.from_matrix(rotation.reshape(-1, 3, 3)).as_rotvec()
-    return np.asarray(rotvecs.reshape(*rotation.shape[:-2], 3))
+
+def _from_unit_quat(quaternion: Array) -> Array:
+    """Rotation matrices (..., 3, 3) of unit quaternions (..., 4) in the order x, y, z, w."""
+    outer = quaternion[..., :, None] * quaternion[..., None, :]
+    vector = outer[..., :3, :3]
+    scalar = outer[..., 3, 3] - np.trace(vector, axis1=-2, axis2=-1)
+    return np.asarray(2 * (vector + hat(outer[..., 3, :3])) + scalar[..., None, None] * np.eye(3))
+
+
+def _quat(rotation: ArrayLike) -> Array:
+    """Unit quaternions (..., 4) in the order x, y, z, w with w >= 0 of rotation matrices (..., 3, 3).
+
+    A matrix gives four multiples of its quaternion, the rows below; the longest is the most exact (Shepperd 1978).
+    """
+    R = _proper(np.asarray(rotation, float))
+    trace = np.trace(R, axis1=-2, axis2=-1)[..., None]
+    skew = R - np.swapaxes(R, -1, -2)
+    rows = np.empty((*R.shape[:-2], 4, 4))
+    rows[..., :3, :3] = R + np.swapaxes(R, -1, -2) + (1 - trace)[..., None] * np.eye(3)
+    rows[..., 3, :3] = rows[..., :3, 3] = np.stack([skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]], -1)
+    rows[..., 3, 3] = 1 + trace[..., 0]
+    longest = np.diagonal(rows, axis1=-2, axis2=-1).argmax(-1)[..., None, None]
+    quaternion = np.take_along_axis(rows, longest, -2)[..., 0, :]
+    length = np.linalg.norm(quaternion, axis=-1, keepdims=True)
+    return np.asarray(quaternion / np.where(quaternion[..., 3:] < 0, -length, length))
+
+
+def _proper(matrix: Array) -> Array:
+    """The matrices (..., 3, 3), those that are no rotations to rounding replaced by the nearest ones.
+
+    Raises:
+        ValueError: a matrix mirrors or is singular.
+        LinAlgError: a matrix is not finite.
+    """
+    with np.errstate(invalid="ignore"):
+        mirrors = np.linalg.det(matrix) <= 0
+    if mirrors.any():
+        raise ValueError("a rotation matrix with a determinant of 0 or less")
+    deviation = np.abs(matrix @ np.swapaxes(matrix, -1, -2) - np.eye(3)).max((-1, -2))
+    if (deviation <= _ROUNDING).all():
+        return matrix
+    return np.where((deviation <= _ROUNDING)[..., None, None], matrix, nearest_rotation(matrix))
 
 
 def left_jacobian(rotvec: ArrayLike) -> Array:
@@ -152,12 +194,16 @@ def from_rotvec(rotvec: ArrayLike, translation: ArrayLike) -> Array:
 
 
 def from_quat_xyzw(quaternion: ArrayLike, translation: ArrayLike) -> Array:
-    """Transforms of quaternions (..., 4) in the order x, y, z, w (ROS, scipy) and translations (..., 3) m."""
-    from scipy.spatial.transform import Rotation
+    """Transforms of quaternions (..., 4) in the order x, y, z, w (ROS, scipy) and translations (..., 3) m.
 
+    Raises:
+        ValueError: a quaternion is zero.
+    """
     quaternion = np.asarray(quaternion, float)
-    matrices = Rotation.from_quat(quaternion.reshape(-1, 4)).as_matrix()
-    return make(matrices.reshape(*quaternion.shape[:-1], 3, 3), translation)
+    length = np.linalg.norm(quaternion, axis=-1, keepdims=True)
+    if (length == 0).any():
+        raise ValueError("a quaternion of length zero")
+    return make(_from_unit_quat(quaternion / length), translation)
 
 
 def from_quat_wxyz(quaternion: ArrayLike, translation: ArrayLike) -> Array:
@@ -167,12 +213,7 @@ def from_quat_wxyz(quaternion: ArrayLike, translation: ArrayLike) -> Array:
 
 def to_quat_xyzw(a_T_b: ArrayLike) -> Array:
     """Quaternions (..., 4) in the order x, y, z, w with w >= 0 of transforms (..., 4, 4)."""
-    from scipy.spatial.transform import Rotation
-
-    a_T_b = np.asarray(a_T_b, float)
-    matrices = a_T_b[..., :3, :3].reshape(-1, 3, 3)
-    quaternions = Rotation.from_matrix(matrices).as_quat(canonical=True)
-    return np.asarray(quaternions.reshape(*a_T_b.shape[:-2], 4))
+    return _quat(np.asarray(a_T_b, float)[..., :3, :3])
 
 
 def to_quat_wxyz(a_T_b: ArrayLike) -> Array:

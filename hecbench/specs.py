@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import partial
@@ -31,6 +31,7 @@ class Kind(StrEnum):
     EXPORTER = "exporter"
     SEGMENTER = "segmenter"
     TRANSLATOR = "translator"
+    PERCEPTION = "perception"
     ROBOT = "robot"
     GRIPPER = "gripper"
     CAMERA = "camera"
@@ -55,7 +56,7 @@ class Spec:
 
 @dataclass(frozen=True)
 class Option:
-    """A setting that a user may give a solver by name, as in ``solver[name=value]``.
+    """A setting that a user may give a plugin by name, as in ``solver[name=value]``.
 
     `parse` turns the text of the value into what the factory takes, and raises `ValueError` for a bad one.
     """
@@ -66,20 +67,16 @@ class Option:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SolverSpec(Spec):
-    """A calibration method. `factory()` imports what is heavy and returns the `Solver`."""
+class ConfigurableSpec(Spec):
+    """A plugin whose factory takes settings."""
 
-    kind: ClassVar[Kind] = Kind.SOLVER
-    factory: Callable[..., Solver]
-    needs: frozenset[Need]
-    reference: str
-    slow: bool = False
-    """Folds of the held-out ruler run only when asked for (renderer methods)."""
+    kind: ClassVar[Kind]
+    factory: Callable[..., Any]
     options: tuple[Option, ...] = ()
     """Keyword arguments that `factory` takes, all optional."""
 
     def configured(self, settings: Mapping[str, str]) -> Self:
-        """The solver with some options set; its name tells them: ``name[option=value,...]``.
+        """The plugin with some options set; its name says them: ``name[option=value,...]``.
 
         Raises:
             InputError: there is no such option, or its value is not understood.
@@ -89,12 +86,12 @@ class SolverSpec(Spec):
         for name, text in settings.items():
             if name not in known:
                 offered = "; ".join(f"{option.name}: {option.summary}" for option in self.options) or "none"
-                raise InputError(f"solver '{self.name}' has no option '{name}'. It has {offered}")
+                raise InputError(f"{self.kind} '{self.name}' has no option '{name}'. It has {offered}")
             try:
                 values[name] = known[name].parse(text)
             except ValueError as error:
                 raise InputError(
-                    f"solver '{self.name}': option {name}={text} is not understood ({error});"
+                    f"{self.kind} '{self.name}': option {name}={text} is not understood ({error});"
                     f" {name}: {known[name].summary}"
                 ) from error
         if not values:
@@ -104,12 +101,28 @@ class SolverSpec(Spec):
 
 
 @dataclass(frozen=True, kw_only=True)
+class SolverSpec(ConfigurableSpec):
+    """A calibration method. `factory()` imports what is heavy and returns the `Solver`."""
+
+    kind: ClassVar[Kind] = Kind.SOLVER
+    factory: Callable[..., Solver]
+    needs: frozenset[Need]
+    reference: str
+    slow: bool = False
+    """Folds of the held-out ruler run only when asked for (renderer methods)."""
+
+
+@dataclass(frozen=True, kw_only=True)
 class DatasetSpec(Spec):
-    """A reader of one format. `sniff(path)` is quick and never raises; `load(path)` decodes no image."""
+    """A reader of one format. `sniff(path)` is quick and never raises; `load(path)` decodes no image.
+
+    A `last_resort` is asked when no other format recognises the path; it may decode images to prove a convention.
+    """
 
     kind: ClassVar[Kind] = Kind.DATASET
     sniff: Callable[[Path], bool]
     load: Callable[[Path], Recording]
+    last_resort: bool = False
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -196,11 +209,11 @@ class ExporterSpec(Spec):
 
 
 @dataclass(frozen=True, kw_only=True)
-class SegmenterSpec(Spec):
+class SegmenterSpec(ConfigurableSpec):
     """Robot masks. `factory()` returns a function recording -> recording with `masks`."""
 
     kind: ClassVar[Kind] = Kind.SEGMENTER
-    factory: Callable[[], Callable[[Recording], Recording]]
+    factory: Callable[..., Callable[[Recording], Recording]]
 
 
 class Translator(Protocol):
@@ -226,12 +239,61 @@ class Translator(Protocol):
 
 
 @dataclass(frozen=True, kw_only=True)
-class TranslatorSpec(Spec):
+class TranslatorSpec(ConfigurableSpec):
     """Image translation. One that `follows_pose` reads `part`, and is asked again as the pose improves."""
 
     kind: ClassVar[Kind] = Kind.TRANSLATOR
-    factory: Callable[[], Translator]
+    factory: Callable[..., Translator]
     follows_pose: bool = False
+
+
+class RobotSight(Protocol):
+    """What a network sees of the robot in one picture of H x W px."""
+
+    @property
+    def keypoints(self) -> NDArray[np.float64]:
+        """(K, 2) px, of the points that `Perceiver.keypoint_positions` places."""
+        ...
+
+    @property
+    def trust(self) -> NDArray[np.float64]:
+        """(K,) in [0, 1]: how sure each keypoint is."""
+        ...
+
+    def visible(self) -> NDArray[np.float32]:
+        """(H, W) in [0, 1]: the robot where nothing hides it; all 0 when there is none."""
+        ...
+
+    def whole(self) -> NDArray[np.float32]:
+        """(H, W) in [0, 1]: the robot as if nothing hid it."""
+        ...
+
+    def colours(self) -> NDArray[np.float32]:
+        """(H, W, 3) RGB in [0, 1]: the colours of the robot's model, wherever it may be."""
+        ...
+
+
+class Perceiver(Protocol):
+    """A trained network that finds a robot in photographs."""
+
+    def see(self, image: NDArray[np.uint8]) -> RobotSight:
+        """What is in a picture (H, W, 3) RGB."""
+        ...
+
+    def keypoint_positions(
+        self, robot: str, links: Sequence[str], frame_T_link: NDArray[np.float64]
+    ) -> NDArray[np.float64]:
+        """(..., K, 3) m of the robot's keypoints, in the frame of frame_T_link (..., L, 4, 4) of its links."""
+        ...
+
+
+@dataclass(frozen=True, kw_only=True)
+class PerceptionSpec(Spec):
+    """A trained network. `factory()` loads its weights. `robots` are those that it knows, by name or URDF's name."""
+
+    kind: ClassVar[Kind] = Kind.PERCEPTION
+    robots: tuple[str, ...]
+    factory: Callable[[], Perceiver]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -253,5 +315,6 @@ AnySpec = (
     | ExporterSpec
     | SegmenterSpec
     | TranslatorSpec
+    | PerceptionSpec
     | DeviceSpec
 )

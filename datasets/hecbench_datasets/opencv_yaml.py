@@ -29,11 +29,11 @@ from hecbench_datasets.reading.sources import (
 _ROBOT = re.compile(r"T1|robot|gripper|flange|hand|tool|ee\b|base", re.IGNORECASE)
 _TARGET = re.compile(r"T2|target|cam|marker|board|tag|eye", re.IGNORECASE)
 _NUMBERED = re.compile(r"^(\w*?)_?(\d+)$")
-_FIRST = re.compile(r"^\s*\w*?_?0\s*:\s*!!opencv-matrix", re.MULTILINE)
+_FIRST = re.compile(r"^\s*\w*(?<!\d)[01]\s*:\s*!!opencv-matrix", re.MULTILINE)
 
 
 def sniff(path: Path) -> bool:
-    """A file, or a folder with one, whose matrices are numbered from 0."""
+    """A file, or a folder with one, whose matrices are numbered from 0 or 1."""
     return _file(path) is not None
 
 
@@ -47,7 +47,7 @@ def load(path: Path) -> Recording:
     """Read the pairs."""
     file = _file(path)
     if file is None:
-        raise InputError(f"{path}: holds no OpenCV matrices numbered from 0, such as T1_0 and T2_0")
+        raise InputError(f"{path}: holds no OpenCV matrices numbered from 0 or 1, such as T1_0 and T2_0")
     families = _families(file)
     robot = [name for name in families if _ROBOT.search(name) and not _TARGET.search(name)]
     target = [name for name in families if _TARGET.search(name)]
@@ -76,7 +76,7 @@ def _families(file: Path) -> dict[str, Array]:
     return {
         name: finite([rows[i] for i in sorted(rows)], f"{file}: {name}")
         for name, rows in found.items()
-        if sorted(rows) == list(range(len(rows)))
+        if sorted(rows) == list(range(min(rows), min(rows) + len(rows))) and min(rows) in (0, 1)
     }
 
 

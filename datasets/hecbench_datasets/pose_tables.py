@@ -1,98 +1,100 @@
-"""Two tables of poses without stamps, one row a sample: x y z and a rotation of 3 or 4 numbers, or 12 or 16.
+"""A folder in nobody's format: tables of poses or joints in any spelling, beside each other or beside pictures.
 
-The files' names say which is the robot's. UR's `p[x,y,z,rx,ry,rz]` is understood. Units, quaternion or Euler
-order, degrees, directions and mounting are proven by consistency. With pictures instead of a second table the
-mounting and the rotation must be told.
+Words in headers and file names say which stream is the robot's. Units, orders, directions and the mounting are proven
+by consistency; beside pictures, the target is found in them first. It is tried when no other format fits.
 """
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterable
 from pathlib import Path
 
 from hecbench.errors import InputError
-from hecbench.exchange.conventions import HINTS_NAME, readings
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import DatasetSpec
-from hecbench_datasets.reading.hints import hinted_target, hints_for
+from hecbench_datasets.reading.beside_pictures import load_beside_pictures
+from hecbench_datasets.reading.columns import ROBOT_WORDS, TARGET_WORDS, Columns, Poses
+from hecbench_datasets.reading.hints import hints_for
+from hecbench_datasets.reading.nearest import nearest_format
 from hecbench_datasets.reading.pairing import Documented, paired
-from hecbench_datasets.reading.sources import IMAGE_SUFFIXES, Array, files_in, foreign, head, table, text
-
-_ROBOT = re.compile(r"robot|flange|gripper|hand|effector|tool|base_T|tcp|\bposes?$", re.IGNORECASE)
-_TARGET = re.compile(r"cam|target|marker|tag|board|tracking", re.IGNORECASE)
-_SUFFIXES = (".csv", ".txt", ".tsv")
-_LENGTHS = (6, 7, 12, 16)
-
-
-def _rows(content: str, source: str) -> Array:
-    return table(re.sub(r"p?\[|\]", " ", content), source)
-
-
-def _columns(file: Path) -> int:
-    lines = head(file).splitlines()
-    try:
-        return len(_rows("\n".join(lines[: max(len(lines) - 1, 1)]), str(file))[0])
-    except InputError:
-        return 0
-
-
-def _files(path: Path) -> tuple[Path | None, Path | None]:
-    tables = [file for file in files_in(path, *_SUFFIXES) if _columns(file) in _LENGTHS]
-    target = [file for file in tables if _TARGET.search(file.stem) and not _ROBOT.search(file.stem)]
-    robot = [file for file in tables if _ROBOT.search(file.stem) and file not in target]
-    return (robot[0] if len(robot) == 1 else None), (target[0] if len(target) == 1 else None)
+from hecbench_datasets.reading.sources import foreign
+from hecbench_datasets.reading.survey import Survey, survey
+from hecbench_datasets.reading.tables import TABLE_SUFFIXES
 
 
 def sniff(path: Path) -> bool:
-    """A folder with one table of robot poses, and one of target poses or pictures."""
-    robot, target = _files(path)
-    return robot is not None and (target is not None or bool(files_in(path, *IMAGE_SUFFIXES)))
+    """Any folder, and any file that may be a table."""
+    return path.is_dir() or (path.suffix.lower() in TABLE_SUFFIXES and path.is_file())
 
 
 @foreign
 def load(path: Path) -> Recording:
-    """Read the tables."""
-    robot_file, target_file = _files(path)
-    if robot_file is None:
-        raise InputError(
-            f"{path}: holds no single table of robot poses (robot.csv) of 6, 7, 12 or 16 columns"
-        )
-    robot = _rows(text(robot_file), str(robot_file))
+    """Read what is there, and prove how."""
+    found = survey(path)
     hints, hints_file = hints_for(path)
-    camera = hints.camera_model()
-    if target_file is not None:
-        target = _rows(text(target_file), str(target_file))
-        return paired(path, robot, target, Documented(), hints, camera=camera)
-    images = files_in(path, *IMAGE_SUFFIXES)
-    if len(images) != len(robot):
-        raise InputError(
-            f"{path}: {len(images)} pictures for {len(robot)} rows of {robot_file.name}; pair them"
+    robot, target = _streams(found)
+    if robot is not None and target is not None:
+        documented = Documented(
+            robot_rotation=robot.rotations or None,
+            robot_unit=robot.unit,
+            target_rotation=target.rotations or None,
+            target_unit=target.unit,
         )
-    if hints.mounting is None or (robot.shape[1] in (6, 7) and hints.robot_rotation is None):
-        raise InputError(
-            f"{path}: without target poses nothing proves the convention; write mounting, robot_rotation "
-            f"(rotvec, quat_xyzw, euler_ZYX ...) and target into {HINTS_NAME}"
-        )
-    reading = readings(
-        robot,
-        ("base", "flange"),
-        rotation=hints.robot_rotation,
-        unit=hints.robot_unit,
-        inverted=hints.robot_pose == "flange_T_base",
-    )[0]
-    return Recording(
-        name=path.resolve().name,
-        mounting=hints.mounting,
-        sample_ids=tuple(image.stem for image in images),
-        camera=camera,
-        target=hinted_target(hints, hints_file),
-        base_T_flange=reading.poses,
-        images=tuple(images),
-        folder=path,
-        notes=(f"{path}: read as {hints.mounting}, {reading.text}, as told",),
-    )
+        return paired(path, robot.numbers, target.numbers, documented, hints, camera=hints.camera_model())
+    stream = _of_robot(found, robot)
+    if stream is not None and found.pictures:
+        return load_beside_pictures(found, stream, robot, hints, hints_file)
+    raise InputError(f"{path}: holds {found.found}; {_missing(found, robot)}")
+
+
+def _of_robot(found: Survey, robot: Poses | None) -> Columns | None:
+    """The stream of the robot's poses, else the only one with joints."""
+    if robot is not None:
+        return next(stream for stream in found.streams if robot in stream.poses)
+    joints = [stream for stream in found.streams if stream.joints is not None]
+    return joints[0] if len(joints) == 1 else None
+
+
+def _streams(found: Survey) -> tuple[Poses | None, Poses | None]:
+    """The robot's and the target's poses, by the words of columns, then of files."""
+    named = [(_words(found, stream, poses), poses) for stream in found.streams for poses in stream.poses]
+    target = [poses for words, poses in named if _calls(words) == "target"]
+    robot = [poses for words, poses in named if _calls(words) == "robot"]
+    unnamed = [poses for words, poses in named if _calls(words) is None]
+    if not robot and len(unnamed) == 1:
+        robot = unnamed
+    elif not target and len(unnamed) == 1 and robot:
+        target = unnamed
+    return (robot[0] if len(robot) == 1 else None), (target[0] if len(target) == 1 else None)
+
+
+def _words(found: Survey, stream: Columns, poses: Poses) -> tuple[str, str]:
+    source = Path(stream.source)
+    inside = source.relative_to(found.path) if source.is_relative_to(found.path) else Path(source.name)
+    return poses.name, str(inside.with_suffix("")) if inside.name else source.stem
+
+
+def _calls(words: tuple[str, str]) -> str | None:
+    """Whose poses these are: the columns' words go before the file's."""
+    for text in words:
+        robot, target = ROBOT_WORDS.search(text), TARGET_WORDS.search(text)
+        if robot or target:
+            return "target" if target and not robot else "robot"
+    return None
+
+
+def _missing(found: Survey, robot: Poses | None) -> str:
+    """The nearest format, or the one thing to add."""
+    folder = found.path if found.path.is_dir() else found.path.parent
+    if robot is not None:
+        near = "pictures of the target, or a table target.csv of its poses in the camera, are missing"
+    elif any(stream.poses or stream.joints is not None for stream in found.streams):
+        near = "which of them is the robot's stays open: call it robot.csv, and the other one target.csv"
+    else:
+        near = "a table robot.csv is missing, of the robot's joints or poses (x y z and 3 or 4 numbers of the rotation)"
+        near = nearest_format(found.files, folder) or near
+    return near
 
 
 @hookimpl
@@ -100,7 +102,8 @@ def hecbench_datasets() -> Iterable[DatasetSpec]:
     """This file's format."""
     yield DatasetSpec(
         name="pose_tables",
-        summary="two tables of poses (robot.csv, target.csv), or one beside pictures; conventions proven",
+        summary="a plain folder: tables of poses or joints, or one beside pictures; conventions proven",
         sniff=sniff,
         load=load,
+        last_resort=True,
     )

@@ -15,10 +15,11 @@ from pathlib import Path, PurePosixPath
 import numpy as np
 
 from hecbench.errors import InputError
+from hecbench.exchange.conventions import HINTS_NAME
 from hecbench.recording import Mounting, Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import DatasetSpec
-from hecbench_datasets.reading.hints import hints_for
+from hecbench_datasets.reading.hints import Hints, hints_for
 from hecbench_datasets.reading.pairing import Documented, paired
 from hecbench_datasets.reading.sources import (
     Array,
@@ -30,7 +31,7 @@ from hecbench_datasets.reading.sources import (
     zip_bytes,
     zip_names,
 )
-from hecbench_datasets.reading.streams import interpolate, time_offset_s
+from hecbench_datasets.reading.streams import clock_units, in_seconds, interpolate, lag_s, time_offset_s
 
 MOST_SAMPLES = 160
 """A stream is thinned evenly to about so many pairs: neighbours at camera rate repeat each other."""
@@ -38,7 +39,6 @@ MOST_SAMPLES = 160
 _ROBOT = re.compile(r"hand|robot|flange|gripper|effector|tool|base_ee", re.IGNORECASE)
 _CAMERA = re.compile(r"cam|eye|target|marker|tag|board|tracking", re.IGNORECASE)
 _SUFFIXES = (".csv", ".txt", ".tum")
-_NANOSECONDS_ABOVE = 1e14
 _LONGEST_S = 1e5
 
 
@@ -95,20 +95,24 @@ def load(path: Path) -> Recording:
             f"{path}: expected two files, one named like 'robot' or 'hand', one like 'camera' or 'target'"
         )
     (robot_stamps, robot), (camera_stamps, camera) = (_read(*place) for place in found)
+    units = clock_units(robot_stamps, camera_stamps)
+    robot_stamps, camera_stamps = in_seconds(robot_stamps, units[0]), in_seconds(camera_stamps, units[1])
+    for (file, name), stamps in zip(found, (robot_stamps, camera_stamps), strict=True):
+        if np.ptp(stamps) > _LONGEST_S:
+            raise InputError(
+                f"{file}{name and f': {name}'}: its stamps span {np.ptp(stamps):.3g} s; give one recording"
+            )
     hints, _ = hints_for(path)
     rows = np.arange(len(camera))
-    note = "the stamps are equal: paired row by row"
-    if len(robot_stamps) != len(camera_stamps) or not np.array_equal(robot_stamps, camera_stamps):
-        offset, quality = hints.time_offset_s, None
-        if offset is None:
-            offset, quality = time_offset_s(robot_stamps, robot, camera_stamps, camera)
+    offset, note = _offset(hints, robot_stamps, robot, camera_stamps, camera)
+    if offset is not None:
         inside = (camera_stamps + offset >= robot_stamps[0]) & (camera_stamps + offset <= robot_stamps[-1])
         if not inside.any():
             raise InputError(f"{path}: the two streams do not overlap in time; check their clocks and units")
         rows, camera_stamps, camera = rows[inside], camera_stamps[inside], camera[inside]
         robot, robot_stamps = interpolate(robot_stamps, robot, camera_stamps + offset), camera_stamps + offset
-        how = "as told" if quality is None else f"turning speeds correlate to {quality:.2f}"
-        note = f"robot poses interpolated at camera stamps + {offset:.4f} s ({how})"
+    if units != ("s", "s"):
+        note += f"; stamps read in {' and '.join(dict.fromkeys(units))}"
     step = -(-(rows[-1] + 1) // MOST_SAMPLES)
     kept = rows % step == 0
     documented = Documented(
@@ -130,18 +134,40 @@ def load(path: Path) -> Recording:
     return replace(recording, notes=(*recording.notes, note))
 
 
+def _offset(
+    hints: Hints, robot_stamps: Array, robot: Array, camera_stamps: Array, camera: Array
+) -> tuple[float | None, str]:
+    """Seconds to add to the camera's stamps, None to pair row by row, and why."""
+    if hints.time_offset_s is not None:
+        return (
+            hints.time_offset_s,
+            f"robot poses interpolated at camera stamps + {hints.time_offset_s:.4f} s, as told",
+        )
+    if np.array_equal(robot_stamps, camera_stamps):
+        lag = lag_s(robot_stamps, robot, camera)
+        if lag is None:
+            return None, "the stamps are equal, and the turning speeds show no lag: paired row by row"
+        return lag, (
+            f"the stamps are equal, but the turning speeds show a lag of {abs(lag):.3f} s: robot poses "
+            f"interpolated at camera stamps + {lag:.4f} s"
+        )
+    offset, quality = time_offset_s(robot_stamps, robot, camera_stamps, camera)
+    if offset is None:
+        return 0.0, (
+            f"the offset between the clocks is unknown (turning speeds correlate to {quality:.2f}): taken as none; "
+            f"write time_offset_s into {HINTS_NAME}"
+        )
+    return offset, (
+        f"robot poses interpolated at camera stamps + {offset:.4f} s (turning speeds correlate to {quality:.2f})"
+    )
+
+
 def _read(file: Path, name: str) -> tuple[Array, Array]:
-    """Stamps (N,) s in order, and poses (N, 7)."""
+    """Stamps (N,) in order, and poses (N, 7)."""
     source = f"{file}: {name}" if name else str(file)
     rows = table(zip_bytes(file, name).decode("utf-8", "replace") if name else text(file), source)
     if rows.shape[1] != 8:
         raise InputError(f"{source}: {rows.shape[1]} numbers a row; expected t, x y z, qx qy qz qw")
-    if np.abs(rows[:, 0]).max() > _NANOSECONDS_ABOVE:
-        rows[:, 0] *= 1e-9
-    if np.ptp(rows[:, 0]) > _LONGEST_S:
-        raise InputError(
-            f"{source}: its stamps span {np.ptp(rows[:, 0]):.3g} s; give one recording, in s or ns"
-        )
     rows = rows[np.argsort(rows[:, 0], kind="stable")]
     return rows[:, 0], rows[:, 1:]
 

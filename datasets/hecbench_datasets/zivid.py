@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from hecbench.errors import InputError
-from hecbench.exchange.conventions import HINTS_NAME, readings
+from hecbench.exchange.conventions import HINTS_NAME
+from hecbench.exchange.pose_numbers import readings
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import DatasetSpec

@@ -106,8 +106,10 @@ class _Trial:
         """Inject a fault; one that finds nothing to break is harmless."""
         verb, _, role = fault.partition(" ")
         if verb in ("kill", "hang"):
-            robot = self.robot
-            worker: Any = robot and (robot._control if role == "control" else robot._stream)
+            control = self.robot and self.robot._control
+            worker: Any = (
+                control and control.worker if role == "control" else self.robot and self.robot._stream
+            )
             if worker:
                 with contextlib.suppress(ProcessLookupError):
                     os.kill(worker.pid, signal.SIGKILL if verb == "kill" else signal.SIGSTOP)

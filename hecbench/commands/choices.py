@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import os
 import shlex
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
+
+from hecbench import cache
+from hecbench import threads as most_threads
 
 if TYPE_CHECKING:
     from hecbench.running.solving import Options
@@ -43,6 +47,20 @@ check = click.option(
     "check",
     default=True,
     help="Look for faults in the recording first; a critical one exits with 3.",
+)
+no_cache = click.option(
+    "--no-cache",
+    is_flag=True,
+    expose_value=False,
+    callback=lambda context, option, value: os.environ.update({cache.VARIABLE: "1"} if value else {}),
+    help="Detect the target again, also where the cache has it.",
+)
+threads = click.option(
+    "--jobs",
+    type=click.IntRange(min=1),
+    expose_value=False,
+    callback=lambda context, option, value: None if value is None else most_threads.limit(value),
+    help="At most so many threads; default: one per core. The answer is the same.",
 )
 timeout = click.option(
     "--timeout",

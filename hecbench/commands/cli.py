@@ -155,6 +155,8 @@ def doctor(as_json: bool) -> None:
 
 @cli.command()
 @click.argument("recording", type=choices.ANY_PATH)
+@choices.threads
+@choices.no_cache
 @choices.as_json
 def check(recording: Path, as_json: bool) -> None:
     """Look for faults in a RECORDING before anything is solved; exits with 3 on a critical one."""

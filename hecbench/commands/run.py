@@ -61,6 +61,7 @@ def demo(out: Path, samples: int, seed: int) -> None:
 @click.option("--jobs", type=int, default=1, show_default=True, help="Worker processes; -1: one per core.")
 @click.option("--executor", metavar="URL", help="A dask scheduler, tcp://host:port, instead of --jobs.")
 @click.option("--resume", is_flag=True, help="Go on with what --out holds.")
+@choices.no_cache
 @choices.seed
 @choices.as_json
 def run(

@@ -25,6 +25,8 @@ from hecbench.errors import HecbenchError
 @choices.timeout
 @choices.memory
 @click.option("--out", type=choices.FOLDER, help="Write each estimate to DIR/<solver>.json.")
+@choices.threads
+@choices.no_cache
 @choices.seed
 @choices.as_json
 def solve(

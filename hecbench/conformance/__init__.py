@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from hecbench.conformance import markerless, others, solvers
 from hecbench.conformance.outcome import Check, run
+from hecbench.conformance.perception import check_perception
 from hecbench.conformance.solvers import rig
 from hecbench.errors import Refusal
 from hecbench.specs import (
@@ -11,6 +12,7 @@ from hecbench.specs import (
     DatasetSpec,
     EvaluatorSpec,
     ExporterSpec,
+    PerceptionSpec,
     SegmenterSpec,
     SolverSpec,
     TranslatorSpec,
@@ -38,6 +40,8 @@ def check_plugin(spec: AnySpec) -> list[Check]:
             return run({"both mountings": others.exports}, spec)
         case EvaluatorSpec():
             return run({"numbers": others.evaluates}, spec)
+        case PerceptionSpec():
+            return check_perception(spec)
     raise Refusal(f"{spec.name}: there are no checks for a {spec.kind}")
 
 

@@ -10,13 +10,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import product
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.errors import InputError
+from hecbench.exchange.pose_numbers import Reading
+from hecbench.exchange.stillness import (
+    Stillness,
+    length_factor,
+    rotation_misfits,
+    stillness,
+    turns_about_one_axis,
+)
 from hecbench.recording import Mounting
 
 Array = NDArray[np.float64]
@@ -26,58 +33,31 @@ HINTS_NAME = "hecbench-import.yaml"
 
 _CURE = f"write which is meant (mounting, robot_pose, target_pose ...) into {HINTS_NAME} beside it"
 
-EULER_ORDERS = ("XYZ", "XZY", "YXZ", "YZX", "ZXY", "ZYX", "XYX", "XZX", "YXY", "YZY", "ZXZ", "ZYZ")
-ROTATIONS = {
-    4: ("quat_xyzw", "quat_wxyz"),
-    3: ("rotvec", *(f"euler_{order}" for order in EULER_ORDERS + tuple(o.lower() for o in EULER_ORDERS))),
-    9: ("matrix", "matrix_transposed"),
-}
-"""Spellings of a rotation by its count of numbers; Euler orders in capitals turn about the moving axes."""
-
-_METRES_BELOW = 10.0
-_RADIANS_BELOW = 2 * np.pi + 0.1
 _STILL = 0.3
 _CLEARLY_WORSE = 3.0
 _LEAST_SAMPLES = 5
-_MOST_FITTED = 40
-_ANGLE_SLACK_RAD = np.deg2rad(3.0)
-
-
-@dataclass(frozen=True, eq=False)
-class Reading:
-    """One way to read a stream of poses.
-
-    Attributes:
-        poses: (N, 4, 4) m, turned into base_T_flange or camera_T_target.
-        text: names it in notes and errors.
-        deviations: in how many points it departs from what the format's description, or the user, says.
-    """
-
-    poses: Array
-    text: str
-    deviations: int = 0
-
-
-@dataclass(frozen=True)
-class Stillness:
-    """Rms deviations of the target's constant pose, and relative to how much the data move."""
-
-    rotation_deg: float
-    translation_mm: float
-    relative: float
-
-    def __str__(self) -> str:
-        return f"{self.rotation_deg:.3g} deg, {self.translation_mm:.3g} mm"
+_ROTATION_SLACK = 0.1
+"""Of the turns, by which rotations that are right may disagree: a degree of noise in ten."""
+_CONVINCING = 0.1
+"""Of the motion, as `Stillness.relative`: real cells leave 0.002 to 0.05."""
+_SAME = 1e-6
+_MOST_EXAMINED = 20
+_MOST_NAMED = 3
+_MIRROR = np.array([1.0, -1.0, 1.0, 1.0])
 
 
 @dataclass(frozen=True, eq=False)
 class Proof:
-    """The reading that was chosen; `note` says which, how still it holds the target, and what was refused."""
+    """The reading that was chosen; `note` says which, how still it holds the target, and what was refused.
+
+    `robot_text` is the text of the robot's reading.
+    """
 
     mounting: Mounting
     base_T_flange: Array
     camera_T_target: Array
     note: str
+    robot_text: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,94 +75,31 @@ class _Candidate:
     def name(self) -> str:
         return f"{self.mounting}, {self.robot.text}, {self.target.text}"
 
+    def beside(self, other: _Candidate) -> str:
+        """Its name, without units that are the other's too."""
+        units = [
+            (mine.text.split(" in ", 1), its.text.split(" in ", 1)) for mine, its in self._pairs_with(other)
+        ]
+        short = [mine[0] if mine[1:] == its[1:] else " in ".join(mine) for mine, its in units]
+        return f"{self.mounting} with {' and '.join(short)}"
+
+    def _pairs_with(self, other: _Candidate) -> tuple[tuple[Reading, Reading], ...]:
+        return (self.robot, other.robot), (self.target, other.target)
+
+    @property
+    def hand_poses(self) -> Array:
+        return _hand(self.mounting, self.robot.poses)
+
+    def reads_as(self, other: _Candidate) -> bool:
+        """Whether both are the same poses under two names."""
+        same = self.mounting is other.mounting
+        return same and all(
+            np.allclose(mine.poses, its.poses, atol=_SAME) for mine, its in self._pairs_with(other)
+        )
+
     @property
     def sees_target(self) -> bool:
         return bool(np.median(self.target.poses[:, 2, 3]) > 0)
-
-
-def readings(
-    numbers: ArrayLike,
-    frames: tuple[str, str],
-    *,
-    rotation: str | None = None,
-    assumed_rotation: str | None = None,
-    unit: str | None = None,
-    inverted: bool | None = None,
-    assumed_inverted: bool = False,
-) -> list[Reading]:
-    """Every reading of rows of numbers: position first, then the rotation, or a 3x4 or 4x4 matrix.
-
-    A matrix is row-major; a 4x4 whose last column is 0 0 0 1 is read as column-major.
-
-    Args:
-        numbers: (N, 6 | 7 | 12 | 16), or (N, 4, 4).
-        frames: of the pose that is wanted, such as ("base", "flange").
-        rotation: a name of `ROTATIONS`, when the user says so: the only one tried.
-        assumed_rotation: the documented name; others count as deviations. None: none is documented.
-        unit: "m" or "mm"; None: by magnitude, since no arm reaches 10 m.
-        inverted: whether the numbers are the inverse pose, when the user says so; None tries both.
-        assumed_inverted: the documented direction; the other one counts as a deviation.
-
-    Raises:
-        InputError: the rows are not of these lengths, or the quaternions are not of unit length.
-    """
-    rows = np.asarray(numbers, float)
-    rows = rows.reshape(len(rows), -1)
-    if rows.shape[1] in (12, 16):
-        if rows.shape[1] == 16 and not rows[:, [3, 7, 11]].any():
-            rows = np.swapaxes(rows.reshape(-1, 4, 4), 1, 2).reshape(-1, 16)
-        matrices = rows[:, :12].reshape(-1, 3, 4)
-        position, turn = matrices[:, :, 3], matrices[:, :, :3].reshape(-1, 9)
-        assumed_rotation = assumed_rotation or "matrix"
-    else:
-        position, turn = rows[:, :3], rows[:, 3:]
-    names = ROTATIONS.get(turn.shape[1], ())
-    if not names:
-        raise InputError(
-            f"a pose of {rows.shape[1]} numbers; expected x y z and 3 or 4 of the rotation, or a 4x4 matrix"
-        )
-    if rotation is not None and rotation not in names:
-        raise InputError(f"rotation '{rotation}' does not fit {turn.shape[1]} numbers: {', '.join(names)}")
-    unit = unit or ("m" if np.median(np.linalg.norm(position, axis=1)) < _METRES_BELOW else "mm")
-    position = position * {"m": 1.0, "mm": 1e-3}[unit]
-    found = []
-    for name in (rotation,) if rotation else names:
-        matrices = _rotation_matrices(name, turn)
-        poses = se3.make(matrices, position)
-        if not se3.is_transform(poses, 1e-2).all():
-            continue
-        poses = se3.make(se3.nearest_rotation(matrices), position)
-        unusual = rotation is None and assumed_rotation not in (None, name)
-        for inverse in (False, True) if inverted is None else (inverted,):
-            a, b = frames[::-1] if inverse else frames
-            found.append(
-                Reading(
-                    se3.inverse(poses) if inverse else poses,
-                    f"{a}_T_{b} {name} in {unit}",
-                    int(unusual) + int(inverted is None and inverse != assumed_inverted),
-                )
-            )
-    if not found:
-        raise InputError("no pose has a proper rotation; check the order and number of columns")
-    return found
-
-
-def _rotation_matrices(name: str, turn: Array) -> Array:
-    """Rotations (N, 3, 3) of their numbers (N, 3 | 4 | 9) by name; angles above 2 pi are degrees."""
-    from scipy.spatial.transform import Rotation
-
-    if name.startswith("matrix"):
-        matrices = turn.reshape(-1, 3, 3)
-        return matrices if name == "matrix" else np.swapaxes(matrices, 1, 2)
-    if name.startswith("quat"):
-        if (np.abs(np.linalg.norm(turn, axis=1) - 1) > 1e-2).any():
-            raise InputError("a quaternion is not of unit length; check the order of the columns")
-        ordered = turn if name == "quat_xyzw" else np.roll(turn, -1, axis=1)
-        return np.asarray(Rotation.from_quat(ordered).as_matrix())
-    radians = turn if np.abs(turn).max() < _RADIANS_BELOW else np.deg2rad(turn)
-    if name == "rotvec":
-        return se3.so3_exp(radians)
-    return np.asarray(Rotation.from_euler(name.removeprefix("euler_"), radians).as_matrix())
 
 
 def prove(
@@ -194,6 +111,9 @@ def prove(
 ) -> Proof:
     """The one combination of readings that holds the target still; documented readings go first.
 
+    Unusual readings are tried when no usual one convinces. Turns about one axis prove nothing: then what is
+    documented is kept.
+
     Args:
         source: names the data in notes and errors.
         robot: readings as base_T_flange (N, 4, 4).
@@ -203,15 +123,18 @@ def prove(
 
     Raises:
         InputError: several readings hold it equally still (all are listed), or none is documented and none
-            holds it still.
+            holds it still; what would make it hold still is named.
     """
     count = len(robot[0].poses)
     if count != len(target[0].poses):
         raise InputError(
             f"{source}: {count} robot poses for {len(target[0].poses)} target poses; pair them up"
         )
-    candidates = list(_candidates(robot, target, mountings, told))
+    candidates = list(_candidates(_usual(robot), _usual(target), mountings, told))
+    if count >= _LEAST_SAMPLES and min(c.stillness.relative for c in candidates) > _CONVINCING:
+        candidates = list(_candidates(robot, target, mountings, told))
     documented = [c for c in candidates if c.deviations == 0]
+    settled = _count(robot) * _count(target) * len(mountings) == 1
     if count < _LEAST_SAMPLES:
         if len(documented) != 1:
             raise InputError(
@@ -221,7 +144,11 @@ def prove(
         return _proof(documented[0], f"{source}: read as {documented[0].name}; too few samples to prove it")
     limit = min(_STILL, _CLEARLY_WORSE * min(c.stillness.relative for c in candidates) + 0.01)
     still = [c for c in candidates if c.stillness.relative <= limit]
-    fitting = [c for c in still if c.deviations == min(s.deviations for s in still)]
+    if any(turns_about_one_axis(c.robot.poses) for c in still or documented):
+        return _documented_only(source, documented)
+    possible = still if settled else [c for c in still if c.sees_target] or still
+    least = min((c.deviations for c in possible), default=0)
+    fitting = _distinct([c for c in possible if c.deviations == least])
     if len(fitting) > 1:
         fitting = [c for c in fitting if c.sees_target] or fitting
     if len(fitting) > 1:
@@ -230,87 +157,116 @@ def prove(
             f"{'; '.join(map(str, fitting[:6]))}; {_CURE}"
         )
     if fitting:
-        best = fitting[0]
-        note = f"{source}: read as {best.name}, which holds the target still to {best.stillness}"
-        if not best.sees_target:
-            note += " but puts it behind the camera"
-        if best.deviations and documented:
-            usual = min(documented, key=lambda c: c.stillness.relative)
-            note += f"; the documented reading does not: {usual}"
-        return _proof(best, note)
+        return _proof(
+            fitting[0], f"{source}: {_margin(fitting[0], candidates, still, documented if settled else [])}"
+        )
     ranked = sorted(candidates, key=lambda c: c.stillness.relative)
-    if len(documented) == 1:
+    if settled:
         note = f"{source}: read as documented, {documented[0]}; no reading holds the target still, "
         return _proof(documented[0], note + f"the best is {ranked[0]}: pairs mixed up, or too little motion?")
     raise InputError(
-        f"{source}: no reading holds the target still; the best are {'; '.join(map(str, ranked[:3]))}; "
-        f"check the pairing of robot and target poses, or {_CURE}"
+        f"{source}: no reading holds the target still{_cause(ranked)}; the best are "
+        f"{'; '.join(map(str, ranked[:3]))}; check the pairing of robot and target poses, or {_CURE}"
     )
 
 
+def _usual(stream: Sequence[Reading]) -> Sequence[Reading]:
+    return [reading for reading in stream if not reading.unusual] or stream
+
+
+def _count(stream: Sequence[Reading]) -> int:
+    """How many readings depart from nothing that is documented."""
+    return sum(reading.deviations == 0 for reading in stream)
+
+
+def _documented_only(source: str, documented: Sequence[_Candidate]) -> Proof:
+    """What is documented, where the motion proves nothing."""
+    if len(documented) == 1:
+        return _proof(
+            documented[0],
+            f"{source}: read as documented, {documented[0].name}; one axis of rotation proves no convention",
+        )
+    raise InputError(
+        f"{source}: one axis of rotation proves no convention, and {len(documented)} readings are "
+        f"possible; {_CURE}"
+    )
+
+
+def _distinct(fitting: Sequence[_Candidate]) -> list[_Candidate]:
+    """Those that differ in their poses, not only in name."""
+    found: list[_Candidate] = []
+    for candidate in fitting:
+        if not any(candidate.reads_as(other) for other in found):
+            found.append(candidate)
+    return found
+
+
+def _margin(
+    best: _Candidate,
+    candidates: Sequence[_Candidate],
+    still: Sequence[_Candidate],
+    documented: Sequence[_Candidate],
+) -> str:
+    """What was chosen, how still it holds the target, and how far behind the others are."""
+    note = f"read as {best.name}, which holds the target still to {best.stillness}"
+    if not best.sees_target:
+        note += " but puts it behind the camera"
+    if best.deviations and documented:
+        usual = min(documented, key=lambda c: c.stillness.relative)
+        note += f"; the documented reading does not: {usual}"
+    rivals = [] if documented else _distinct([c for c in still if not c.reads_as(best)])[:_MOST_NAMED]
+    worse = [c.stillness.relative for c in candidates if c not in still]
+    if rivals:
+        names = " or ".join(rival.beside(best) for rival in rivals)
+        note += f"; {names} would fit as well: if that is meant, {_CURE}"
+    elif worse:
+        note += f"; the next leaves {min(worse) / max(best.stillness.relative, 1e-9):.3g} times as much"
+    return note
+
+
+def _cause(ranked: Sequence[_Candidate]) -> str:
+    """What would make the best readings hold still: another unit, or the other handedness."""
+    for candidate in sorted(ranked[:_MOST_EXAMINED], key=lambda c: c.deviations):
+        hand, seen = candidate.hand_poses, candidate.target.poses
+        mirrored = hand * np.outer(_MIRROR, _MIRROR)
+        if stillness(mirrored, seen).relative < _CONVINCING:
+            return (
+                f", but {candidate.name} does once the y axis of one of the two is turned round: one is left-handed "
+                "(Unity, Unreal); write it in a right-handed frame"
+            )
+        scaled = seen.copy()
+        scaled[:, :3, 3] *= (factor := length_factor(hand, seen))
+        if factor > 0 and stillness(hand, scaled).relative < _CONVINCING:
+            return (
+                f", but {candidate.name} does once the target's lengths are {factor:.4g} times as long: correct the "
+                "unit of one of the two"
+            )
+    return ""
+
+
 def _proof(chosen: _Candidate, note: str) -> Proof:
-    return Proof(chosen.mounting, chosen.robot.poses, chosen.target.poses, note)
+    return Proof(chosen.mounting, chosen.robot.poses, chosen.target.poses, note, chosen.robot.text)
 
 
 def _candidates(
     robot: Sequence[Reading], target: Sequence[Reading], mountings: Sequence[Mounting], told: bool
 ) -> Iterator[_Candidate]:
-    """Combinations worth fitting: rotations must turn by the same angles whatever the directions are."""
-    robot_angles = [_turns(reading.poses) for reading in robot]
-    target_angles = [_turns(reading.poses) for reading in target]
-    pairs = list(product(range(len(robot)), range(len(target))))
-    gaps = [float(np.sqrt(np.mean((robot_angles[i] - target_angles[j]) ** 2))) for i, j in pairs]
-    limit = _CLEARLY_WORSE * min(gaps) + _ANGLE_SLACK_RAD
-    departures = [robot[i].deviations + target[j].deviations for i, j in pairs]
-    for (i, j), gap, deviations in zip(pairs, gaps, departures, strict=True):
-        the_documented_one = deviations == 0 and departures.count(0) == 1
-        if gap > limit and not the_documented_one:
-            continue
-        for mounting in mountings if told else Mounting:
-            flange_poses = robot[i].poses
-            hand = flange_poses if mounting is Mounting.EYE_TO_HAND else se3.inverse(flange_poses)
-            still = stillness(hand, target[j].poses)
-            yield _Candidate(mounting, robot[i], target[j], deviations + (mounting not in mountings), still)
-
-
-def _turns(poses: Array) -> Array:
-    """Angles (N - 1,) rad between neighbouring poses; the inverse poses have the same."""
-    if len(poses) < 2:
-        return np.zeros(1)
-    return np.asarray(se3.rotation_error_rad(poses[:-1], poses[1:]))
-
-
-def stillness(hand: Array, camera_T_target: Array) -> Stillness:
-    """How still the best constant X and Y hold the target, for hand poses (N, 4, 4) m.
-
-    Relative is the larger of how still the target stands for the robot and how still the camera does, so
-    that turning both streams round changes nothing. X by Park and Martin 1994, eq. 12 and 20, over all pairs
-    of at most 40 samples.
-    """
-    chosen = np.unique(np.linspace(0, len(hand) - 1, min(len(hand), _MOST_FITTED)).astype(int))
-    i, j = np.triu_indices(len(chosen), 1)
-    inverse_hand = se3.inverse(hand)
-    A = hand[chosen][j] @ inverse_hand[chosen][i]
-    B = camera_T_target[chosen][j] @ se3.inverse(camera_T_target[chosen][i])
-    turns_A, turns_B = se3.so3_log(A[:, :3, :3]), se3.so3_log(B[:, :3, :3])
-    rotation = se3.nearest_rotation(turns_A.T @ turns_B)
-    left = (A[:, :3, :3] - np.eye(3)).reshape(-1, 3)
-    right = (B[:, :3, 3] @ rotation.T - A[:, :3, 3]).ravel()
-    translation = np.linalg.lstsq(left, right, rcond=None)[0] if len(left) else np.zeros(3)
-    target_T_camera = se3.inverse(camera_T_target)
-    carrier_T_target = inverse_hand @ se3.make(rotation, translation) @ camera_T_target
-    parent_T_camera = hand @ se3.mean(carrier_T_target) @ target_T_camera
-    angle, distance = _rms_deviations(carrier_T_target)
-    relative = max(
-        deviation / max(extent, 1e-9)
-        for constant, moving in ((carrier_T_target, camera_T_target), (parent_T_camera, target_T_camera))
-        for deviation, extent in zip(_rms_deviations(constant), _rms_deviations(moving), strict=True)
+    """Combinations worth fitting: those whose rotations agree, and the one that is documented."""
+    hands = [(mounting, reading) for reading in robot for mounting in (mountings if told else Mounting)]
+    misfits = rotation_misfits(
+        [_hand(mounting, reading.poses) for mounting, reading in hands], [reading.poses for reading in target]
     )
-    return Stillness(float(np.rad2deg(angle)), 1e3 * distance, relative)
+    best = np.sort(misfits, axis=None)[:_MOST_EXAMINED]
+    limit = max(best[-1], min(_CLEARLY_WORSE * best[0], _STILL) + _ROTATION_SLACK)
+    own = [reading.deviations + (mounting not in mountings) for mounting, reading in hands]
+    departures = np.add.outer(own, [reading.deviations for reading in target])
+    documented = departures == 0
+    too_few = len(robot[0].poses) < _LEAST_SAMPLES
+    for i, j in np.argwhere((misfits <= limit) | (documented & (too_few | (documented.sum() == 1)))):
+        mounting, reading = hands[i]
+        still = stillness(_hand(mounting, reading.poses), target[j].poses)
+        yield _Candidate(mounting, reading, target[j], int(departures[i, j]), still)
 
 
-def _rms_deviations(poses: Array) -> tuple[float, float]:
-    """Rms deviations (rad, m) of poses (N, 4, 4) from their chordal mean."""
-    mean = se3.mean(poses)
-    angles, distances = se3.rotation_error_rad(mean, poses), se3.translation_error_m(mean, poses)
-    return float(np.sqrt(np.mean(angles**2))), float(np.sqrt(np.mean(distances**2)))
+def _hand(mounting: Mounting, base_T_flange: Array) -> Array:
+    return base_T_flange if mounting is Mounting.EYE_TO_HAND else se3.inverse(base_T_flange)

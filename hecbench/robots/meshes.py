@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hecbench import cache
 from hecbench.errors import InputError
 from hecbench.robots.urdf_files import find_mesh
 
@@ -50,7 +51,7 @@ def visual_parts(robot: Any, urdf: Path) -> tuple[Part, ...]:
         for visual in link.visuals
         if visual.geometry.mesh is not None
     }
-    entry = _cache_folder() / f"robot-{_digest(urdf, files)}.npz"
+    entry = cache.folder() / f"robot-{_digest(urdf, files)}.npz"
     parts = _read(entry)
     if parts is None:
         parts = tuple(
@@ -140,10 +141,6 @@ def _mesh_colour(mesh: Any) -> tuple[float, float, float]:
 def _rgb(rgba: NDArray[np.float64]) -> tuple[float, float, float]:
     red, green, blue = (float(value) for value in rgba[:3])
     return red, green, blue
-
-
-def _cache_folder() -> Path:
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "hecbench"
 
 
 def _digest(urdf: Path, files: dict[str, Path]) -> str:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hecbench import diagnose, registry
+from hecbench import diagnose, registry, threads
 from hecbench.estimate import Estimate, Status, Termination
 from hecbench.preparation import load_recording, prepare, segmented
 from hecbench.recording import Recording
@@ -125,12 +125,18 @@ def _executed(
         yield from (execute(task, options) for task in tasks)
         return
     running = (
-        pool.on_this_machine(execute, tasks, (options,), jobs)
+        pool.on_this_machine(_execute_alone, tasks, (options,), jobs)
         if executor is None
-        else pool.on_cluster(execute, tasks, (options,), executor)
+        else pool.on_cluster(_execute_alone, tasks, (options,), executor)
     )
     for task, result in running:
         yield (_lost(task, options, str(result)), None) if isinstance(result, Ended) else result
+
+
+def _execute_alone(task: Task, options: Options) -> tuple[list[Estimate], Evidence | None]:
+    """One of several worker processes, which have the cores between them: a thread each."""
+    threads.limit(1)
+    return execute(task, options)
 
 
 def _lost(task: Task, options: Options, reason: str) -> list[Estimate]:

@@ -1,4 +1,4 @@
-"""Calibration methods and evaluators, one per file."""
+"""Calibration methods, evaluators and trained networks, one per file."""
 
-plugin_folders = ("solvers", "observers", "evaluators", "segmenters", "translators")
+plugin_folders = ("solvers", "observers", "evaluators", "segmenters", "translators", "networks")
 """Folders whose modules are plugins, imported one by one when plugins are listed."""

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+from hecbench.commands import choices
 from hecbench.errors import InputError
 
 
@@ -13,6 +14,7 @@ from hecbench.errors import InputError
 @click.argument("recording", type=click.Path(path_type=Path))
 @click.argument("destination", type=click.Path(path_type=Path, file_okay=False), metavar="DEST")
 @click.option("--refit-intrinsics", is_flag=True, help="Calibrate the camera although K is given.")
+@choices.no_cache
 def detect(recording: Path, destination: Path, refit_intrinsics: bool) -> None:
     """Find the target in a RECORDING's images; write the recording with its corners and pictures of them to DEST."""
     from hecbench import preparation

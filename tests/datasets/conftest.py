@@ -15,8 +15,8 @@ def data(shared):
 
 @pytest.fixture(scope="session")
 def sniffers():
-    """Names of the formats that recognise a path."""
-    specs = registry.load().ready(Kind.DATASET, DatasetSpec)
+    """Names of the formats that recognise a path, without the last resort, which takes any folder."""
+    specs = [s for s in registry.load().ready(Kind.DATASET, DatasetSpec) if not s.last_resort]
     return lambda path: [spec.name for spec in specs if spec.sniff(path)]
 
 

@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hecbench_hardware.clearance import RESOLUTION_M, body_points, check_motion, check_pose, tool_line
-from hecbench_hardware.controller_sim.arm import SimulatedArm
+from hecbench_hardware.controller_sim.arm import SimulatedArm, vector_of
+from hecbench_hardware.controller_sim.motions import move_linear
 from hecbench_hardware.kinematics import ARMS
 from hecbench_hardware.limits import Box, Limits, Sphere
 from hecbench_hardware.motions import JointMotion, LineMotion, motion_time_s, six_joints
@@ -76,9 +77,10 @@ def test_the_controller_drives_the_line_that_is_checked(motions):
     """Every cycle of the simulated controller lies on it; with a tool the flange follows an arc far from its chord."""
     motion = motions["long tool"]
     driven = SimulatedArm(ARM)
-    driven.joints, driven.flange_T_tcp = motion.start.copy(), LONG_TOOL
+    driven.joints = motion.start.copy()
+    driven.set_tcp(vector_of(LONG_TOOL))
     cycles = [motion.start]
-    for _ in driven.move_linear(motion.base_T_tcp, 0.25, 0.5):
+    for _ in move_linear(driven, motion.base_T_tcp, 0.25, 0.5):
         cycles.append(driven.joints)
     flange = ARM.forward(np.array(cycles))
     way = np.linalg.norm((flange @ LONG_TOOL)[:, :3, 3] - (flange[0] @ LONG_TOOL)[:3, 3], axis=1)

@@ -132,7 +132,7 @@ def test_wrong_camera_is_bad_input():
 )
 def test_real_pictures_agree_with_the_pose_of_the_detection_library(shared, name, fx, fy, cx, cy):
     picture = cv2.imread(str(shared / "data" / "pupil_tags" / name), cv2.IMREAD_GRAYSCALE)
-    detector = apriltags.detector("tag36h11", 2.0)
+    detector = apriltags.detector("tag36h11", 2.0, 0)
     theirs = detector.detect(picture, estimate_tag_pose=True, camera_params=(fx, fy, cx, cy), tag_size=0.065)[
         0
     ]

@@ -72,7 +72,7 @@ def test_motions_arrive(robot, ready_pose):
 def test_the_tool_offset_of_the_controller_is_respected(connect, controller, ready_pose):
     robot = connect()
     robot.enable()
-    robot._request("call", "setTcp", [0, 0, 0.15, 0.1, 0, 0])
+    controller.fault("tool 0 0 0.15 0.1 0 0")
     assert robot.recover(lambda line: True)
     assert robot.flange_T_tcp[:3, 3] == pytest.approx([0, 0, 0.15])
     robot.move_joints(ready_pose)
@@ -123,16 +123,13 @@ def test_a_path_through_a_forbidden_box_is_refused(connect, ready_pose):
         robot.move_joints([1.0, *robot.state().joints_rad[1:]])
 
 
-LONG_TOOL = [0.0, 0.0, 0.45, 0.0, 0.0, 0.0]
-
-
 @pytest.fixture
 def swinging(connect, controller, ready_pose):
     """A controller taken for a real one, with a long tool, and a flange pose half a turn of the tool's tip away."""
     controller.fault("unmarked")
     robot = connect(limits=Limits(workspace=Box((-1.5, -1.5, -0.5), (1.5, 1.5, 2.0))))
     robot.enable()
-    robot._request("call", "setTcp", LONG_TOOL)
+    controller.fault("tool 0 0 0.45 0 0 0")
     assert robot.recover(lambda line: True)
     robot.move_joints(ready_pose)
     base_T_tcp = robot.settle().base_T_tcp
@@ -176,10 +173,10 @@ def test_the_tip_of_a_tool_is_part_of_the_limits_before_control_is_taken(swingin
         assert Sphere((0.0, 0.0, 0.6), 0.02) in robot.limits.tool
 
 
-def test_a_tool_that_was_changed_since_is_refused(swinging, ready_pose):
+def test_a_tool_that_was_changed_since_is_refused(swinging, controller, ready_pose):
     robot, target = swinging
     before = robot.state().base_T_tcp
-    robot._request("call", "setTcp", [0, 0, 0.2, 0, 0, 0])
+    controller.fault("tool 0 0 0.2 0 0 0")
     wait_until(lambda: se3.translation_error_m(robot.state().base_T_tcp, before) > 0.1)
     for move in (lambda: robot.move_linear(target), lambda: robot.move_joints(ready_pose)):
         with pytest.raises(InputError, match=r"the tool centre point is 0\.250 m from"):
@@ -401,7 +398,7 @@ def test_a_killed_program_leaves_no_process_and_no_motion(controller, connect, n
 
 def test_an_interrupted_request_does_not_shift_the_answers(robot, monkeypatch):
     """As Ctrl-C between sending and receiving does."""
-    connection = robot._control.connection
+    connection = robot._control.worker.connection
 
     poll = type(connection).poll
 
@@ -413,8 +410,8 @@ def test_an_interrupted_request_does_not_shift_the_answers(robot, monkeypatch):
     with monkeypatch.context() as patch:
         patch.setattr(type(connection), "poll", interrupted)
         with pytest.raises(KeyboardInterrupt):
-            robot._control.request("call", "getTCPOffset")
-    assert robot._request("call", "isSteady") is True
+            robot._control.worker.request("call", "getTCPOffset")
+    assert robot._control.request("call", "endFreedriveMode") is True
 
 
 def test_two_arms_at_once(robot, ready_pose):

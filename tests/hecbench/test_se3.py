@@ -61,6 +61,36 @@ def test_rotation_angle_is_accurate_at_both_ends(angle):
     assert se3.rotation_angle(rotation) == pytest.approx(angle, abs=1e-12, rel=1e-9)
 
 
+@pytest.mark.parametrize("angle", [1e-150, 1e-9, 1e-4, 1.0, np.pi - 1e-9, np.pi])
+def test_rotations_agree_with_scipy(angle, rng):
+    from scipy.spatial.transform import Rotation
+
+    rotvecs = rng.normal(size=(50, 3))
+    rotvecs *= angle / np.linalg.norm(rotvecs, axis=1, keepdims=True)
+    rotations = Rotation.from_rotvec(rotvecs)
+    matrices = rotations.as_matrix()
+    np.testing.assert_allclose(se3.so3_exp(rotvecs), matrices, atol=1e-15)
+    np.testing.assert_allclose(se3.so3_exp(se3.so3_log(matrices)), matrices, atol=1e-15)
+    np.testing.assert_allclose(np.linalg.norm(se3.so3_log(matrices), axis=1), angle, rtol=1e-9)
+    spoilt = matrices + rng.normal(0, 1e-4, matrices.shape)
+    np.testing.assert_allclose(
+        se3.so3_exp(se3.so3_log(spoilt)), Rotation.from_matrix(spoilt).as_matrix(), atol=1e-14
+    )
+    quaternions = 3 * rotations.as_quat()
+    np.testing.assert_allclose(se3.from_quat_xyzw(quaternions, np.zeros(3))[:, :3, :3], matrices, atol=1e-15)
+
+
+@pytest.mark.parametrize("matrix", [-np.eye(3), np.zeros((3, 3)), np.full((3, 3), np.nan)])
+def test_what_is_no_rotation_has_no_logarithm(matrix):
+    with pytest.raises((ValueError, np.linalg.LinAlgError)):
+        se3.so3_log(matrix)
+
+
+def test_a_quaternion_of_zero_is_refused():
+    with pytest.raises(ValueError, match="zero"):
+        se3.from_quat_xyzw(np.zeros(4), np.zeros(3))
+
+
 def test_vectorised_over_leading_axes(rng):
     stack = rng.normal(size=(2, 3, 6))
     poses = se3.exp(stack)

@@ -35,11 +35,15 @@ class Hints(msgspec.Struct, forbid_unknown_fields=True):
     mounting: Mounting | None = None
     robot_pose: Literal["base_T_flange", "flange_T_base"] | None = None
     robot_rotation: str | None = None
-    robot_unit: Literal["m", "mm"] | None = None
+    robot_unit: Literal["m", "cm", "mm"] | None = None
     target_pose: Literal["camera_T_target", "target_T_camera"] | None = None
     target_rotation: str | None = None
-    target_unit: Literal["m", "mm"] | None = None
+    target_unit: Literal["m", "cm", "mm"] | None = None
     time_offset_s: float | None = None
+    robot: str | None = None
+    base_link: str | None = None
+    flange_link: str | None = None
+    images: str | None = None
     camera: Camera | None = None
     target: dict[str, Any] | None = None
 

@@ -10,7 +10,8 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from hecbench.errors import InputError
-from hecbench.exchange.conventions import Reading, prove, readings
+from hecbench.exchange.conventions import prove
+from hecbench.exchange.pose_numbers import Reading, readings
 from hecbench.recording import Mounting, Recording
 from hecbench_datasets.reading.hints import Hints
 
@@ -21,9 +22,11 @@ class Documented:
 
     mounting: Mounting | None = None
     robot_inverted: bool = False
-    robot_rotation: str | None = None
+    robot_rotation: str | Sequence[str] | None = None
+    robot_unit: str | None = None
     target_inverted: bool = False
-    target_rotation: str | None = None
+    target_rotation: str | Sequence[str] | None = None
+    target_unit: str | None = None
 
 
 def paired(
@@ -56,7 +59,7 @@ def paired(
         ("base", "flange"),
         rotation=hints.robot_rotation,
         assumed_rotation=documented.robot_rotation,
-        unit=hints.robot_unit,
+        unit=hints.robot_unit or documented.robot_unit,
         inverted=_told(hints.robot_pose, "flange_T_base"),
         assumed_inverted=documented.robot_inverted,
     )
@@ -66,7 +69,7 @@ def paired(
         ("camera", "target"),
         rotation=hints.target_rotation,
         assumed_rotation=documented.target_rotation,
-        unit=hints.target_unit,
+        unit=hints.target_unit or documented.target_unit,
         inverted=_told(hints.target_pose, "target_T_camera"),
         assumed_inverted=documented.target_inverted,
     )

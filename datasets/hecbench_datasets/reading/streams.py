@@ -12,16 +12,54 @@ _LEAST_CORRELATION = 0.5
 _SMALL_RAD = 1e-6
 _FRAMES = 10
 _SEARCH_S = 0.05
+_UNITS_S = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}
+_EPOCH_S = (1e9, 4e9)
+"""Seconds since 1970 of the years 2001 to 2096."""
+_SLOWEST_S = 5.0
+"""Between two rows of a stream; rows further apart are taken for smaller units."""
+_SAME_SPAN = 10.0
+_CLEARLY_BETTER = 2.0
+
+
+def clock_units(robot_stamps: Array, camera_stamps: Array) -> tuple[str, str]:
+    """The units of two streams' stamps: of seconds since 1970 by magnitude, of others by their rate.
+
+    Both streams span about the same time; of the units that make them so, the largest with rows close in time.
+    """
+
+    def possible(stamps: Array) -> list[str]:
+        since_1970 = [u for u, s in _UNITS_S.items() if _EPOCH_S[0] < np.median(stamps) * s < _EPOCH_S[1]]
+        step = float(np.median(np.diff(stamps))) if len(stamps) > 1 else 0.0
+        return since_1970 or [u for u, s in _UNITS_S.items() if step * s < _SLOWEST_S] or ["ns"]
+
+    def disagreement(units: tuple[str, str]) -> float:
+        spans = _span(robot_stamps) * _UNITS_S[units[0]], _span(camera_stamps) * _UNITS_S[units[1]]
+        return float(np.abs(np.log(max(spans[0], 1e-12) / max(spans[1], 1e-12))))
+
+    pairs = [(r, c) for r in possible(robot_stamps) for c in possible(camera_stamps)]
+    return next(
+        (pair for pair in pairs if disagreement(pair) < np.log(_SAME_SPAN)), min(pairs, key=disagreement)
+    )
+
+
+def _span(stamps: Array) -> float:
+    """From the first stamp to the last, whatever a few stray ones say."""
+    return float(np.median(np.diff(stamps))) * (len(stamps) - 1) if len(stamps) > 1 else 0.0
+
+
+def in_seconds(stamps: Array, unit: str) -> Array:
+    """Stamps (N,) of a unit in s."""
+    return stamps * _UNITS_S[unit]
 
 
 def time_offset_s(
     robot_stamps: Array, robot: Array, camera_stamps: Array, camera: Array
-) -> tuple[float, float]:
+) -> tuple[float | None, float]:
     """Seconds to add to the camera's stamps to get the robot's clock, and the correlation there.
 
     A rigid motion turns by the same angle seen from the robot and from the camera. So the two turning speeds
     over time are one curve, shifted; where they correlate best, the angles turned over several camera frames
-    refine the shift. Zero when they correlate below 0.5.
+    refine the shift. None when they correlate below 0.5: the offset is unknown.
 
     Args:
         robot_stamps: (N,) s in order.
@@ -39,7 +77,7 @@ def time_offset_s(
     correlation = correlate(first, second, mode="full") / (scale or 1.0)
     peak = int(correlation.argmax())
     if correlation[peak] < _LEAST_CORRELATION:
-        return 0.0, float(correlation[peak])
+        return None, float(correlation[peak])
     shift = peak - (len(second) - 1) + _vertex(correlation[max(peak - 1, 0) : peak + 2])
     coarse = robot_stamps[0] - camera_stamps[0] + shift * _GRID_S
     inside = (camera_stamps + coarse > robot_stamps[0] + _SEARCH_S) & (
@@ -50,11 +88,32 @@ def time_offset_s(
         return float(coarse), float(correlation[peak])
 
     def mismatch(offset: float) -> float:
-        poses = interpolate(robot_stamps, robot, stamps + offset)
-        return float(np.mean((_turned(poses, _FRAMES) - turned) ** 2))
+        return _mismatch(robot_stamps, robot, stamps + offset, turned)
 
     bounds = coarse - _SEARCH_S, coarse + _SEARCH_S
     return float(minimize_scalar(mismatch, bounds=bounds, method="bounded").x), float(correlation[peak])
+
+
+def lag_s(stamps: Array, robot: Array, camera: Array) -> float | None:
+    """The offset of a camera whose pictures were stamped with the robot's time, where they were taken earlier.
+
+    None unless the turning speeds show it: a shift of more than a quarter of a frame that leaves less than half of the
+    angles' mismatch.
+    """
+    offset, _ = time_offset_s(stamps, robot, stamps, camera)
+    if offset is None or abs(offset) < np.median(np.diff(stamps)) / 4:
+        return None
+    inside = (stamps + offset >= stamps[0]) & (stamps + offset <= stamps[-1])
+    kept, turned = stamps[inside], _turned(camera[inside], _FRAMES)
+    if len(turned) < _FRAMES:
+        return None
+    as_stamped, shifted = (_mismatch(stamps, robot, kept + shift, turned) for shift in (0.0, offset))
+    return offset if as_stamped > _CLEARLY_BETTER**2 * shifted else None
+
+
+def _mismatch(stamps: Array, poses: Array, at: Array, turned: Array) -> float:
+    """Mean squared difference rad^2 between angles (M,) and those of the poses at times (M + 10,) s."""
+    return float(np.mean((_turned(interpolate(stamps, poses, at), _FRAMES) - turned) ** 2))
 
 
 def _turning_speed(stamps: Array, poses: Array) -> Array:

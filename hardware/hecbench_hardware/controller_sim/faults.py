@@ -49,6 +49,7 @@ class Faults:
             "contact": lambda x: setattr(arm, "contact_plane_m", _within(x[0], -_FAR_M, _FAR_M)),
             "push": lambda x: setattr(arm, "external_force_n", _within(x[0], -_STRONG_N, _STRONG_N)),
             "place": self._place,
+            "tool": self._set_tool,
             "hand": lambda x: program.push_by_hand(self._six(x)),
             "program": lambda _: start_program(program, "def other():\n sleep(3600)\nend\n"),
             "end_program": lambda _: program.kill(),
@@ -92,6 +93,12 @@ class Faults:
             raise ValueError
         limit = self.dashboard.program.arm.arm.joint_range_rad
         return np.array([_within(value, -limit, limit) for value in joints_rad])
+
+    def _set_tool(self, offset: list[float]) -> None:
+        if len(offset) != 6:
+            raise ValueError
+        vector = np.array([_within(value, -_FAR_M, _FAR_M) for value in offset])
+        self.dashboard.program.arm.set_tcp(vector)
 
     def _local_mode(self) -> None:
         self.dashboard.program.remote = False

@@ -5,6 +5,7 @@ from __future__ import annotations
 import socket
 from dataclasses import dataclass
 
+from hecbench.errors import InputError
 from hecbench_hardware.devices import DeviceFault, Fault
 
 PORT = 29999
@@ -36,6 +37,12 @@ class Dashboard:
         if not answer.endswith("\n"):
             raise DeviceFault(Fault.LINK_LOST, f"robot {self.host}", f"no answer to '{command}'")
         return answer.strip()
+
+    def refuse_other_model(self, device: str, model: str) -> None:
+        """Raise an `InputError` when another model is there."""
+        answer = self.ask("get robot model").upper()
+        if answer.rstrip("E") != model.upper().rstrip("E"):
+            raise InputError(f"{device} is a {answer}, not a {model}: choose the right --robot")
 
     def is_simulated(self) -> bool:
         """Whether this is our simulated controller."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import socket
 import subprocess
 import sys
+import tempfile
 import threading
 from multiprocessing.connection import Connection
 from pathlib import Path
@@ -25,14 +26,17 @@ class WorkerGone(Exception):
 class Worker:
     """One worker process. Its death is noticed at the next use, and `end` always leaves none behind."""
 
-    def __init__(self, role: str, host: str) -> None:
-        """Start the process; `ready` must follow."""
+    def __init__(self, role: str, host: str, *, patience_s: float = 0.0) -> None:
+        """Start the process; `ready` must follow. `patience_s` is that of `worker.Control` with the pulse."""
         ours, theirs = socket.socketpair()
-        with theirs:
-            command = [sys.executable, "-P", str(Path(worker.__file__)), role, host, str(theirs.fileno())]
+        with theirs, tempfile.TemporaryFile() as shared:
+            shared.truncate(worker.Pulse.SIZE)
+            self.pulse = worker.Pulse(shared.fileno())
+            descriptors = [theirs.fileno(), shared.fileno()]
+            command = [sys.executable, "-P", str(Path(worker.__file__)), role, host]
             self._process = subprocess.Popen(
-                command,
-                pass_fds=[theirs.fileno()],
+                [*command, *map(str, descriptors), str(patience_s)],
+                pass_fds=descriptors,
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL,
@@ -45,6 +49,11 @@ class Worker:
     def pid(self) -> int:
         """Process id."""
         return self._process.pid
+
+    @property
+    def alive(self) -> bool:
+        """Whether the process runs."""
+        return self._process.poll() is None
 
     def ready(self) -> None:
         """Wait until the client is connected.

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-import threading
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from collections.abc import Callable
+from contextlib import AbstractContextManager, suppress
 from dataclasses import asdict, replace
 from typing import Any, Self
 
@@ -20,22 +19,18 @@ from hecbench_hardware.kinematics import Arm
 from hecbench_hardware.limits import Limits, Sphere, refuse_too_fast
 from hecbench_hardware.motions import JointMotion, LineMotion, motion_time_s, six_joints
 from hecbench_hardware.ur import recovery
+from hecbench_hardware.ur.control import Control
 from hecbench_hardware.ur.dashboard import Dashboard, probe
 from hecbench_hardware.ur.outputs import Outputs
-from hecbench_hardware.ur.process import Worker, WorkerGone
-from hecbench_hardware.ur.stream import Sample, StateStream, Supervision, fault_of
-from hecbench_hardware.ur.worker import CALL_S, STOP_RAD_S2
+from hecbench_hardware.ur.stream import Sample, StateStream, Supervision
 
-POLL_S = 0.001
 STILL_RAD_S = 1e-3
 STILL_FOR_S = 0.3
 _ARRIVED_RAD = 1e-3
 _GAP_M = 0.02
 """More than factory calibration explains: the tool centre point was changed since."""
-_BRAKE_S = 0.6
-"""Braking from the highest speed, and some."""
 _NEWS_S = 0.2
-"""How long news may be on its way: why a program ended, or that a motion has arrived."""
+"""How long the news may be on its way that a motion has arrived."""
 
 
 class UrRobot:
@@ -66,33 +61,24 @@ class UrRobot:
         self.name = f"robot {host}"
         self.host, self.arm = host, arm
         self.supervision = supervision or Supervision()
-        self.flange_T_tcp: Array | None = None
-        """Tool centre point that is set on the controller; known once enabled."""
         probe(host)
         self._dashboard = Dashboard(host)
         self.simulated = self._dashboard.is_simulated()
         if not self.simulated:
             self.supervision.refuse_blind()
-        self._refuse_other_model()
+        self._dashboard.refuse_other_model(self.name, arm.name)
         self._carried: tuple[Sphere, ...] = ()
         self.limits = limits or Limits()
-        self._control: Worker | None = None
+        self._control: Control | None = None
         self._speed_slider = speed_slider
         self._slider_before: float | None = None
         self._target: Array | None = None
-        self._stopping = threading.Event()
-        self._motion = threading.Lock()
         self._stream = StateStream(host, self.supervision)
-
-    def _refuse_other_model(self) -> None:
-        answer = self._dashboard.ask("get robot model").upper()
-        if answer.rstrip("E") != self.arm.name.upper().rstrip("E"):
-            raise InputError(f"{self.name} is a {answer}, not a {self.arm.name}: choose the right --robot")
 
     @property
     def limits(self) -> Limits:
         """Bounds of every motion, with everything that the flange carries: at least a rod to the tool centre point."""
-        tool = self._limits.tool + self._carried + tool_line(self._flange_T_tcp())
+        tool = self._limits.tool + self._carried + tool_line(self._reach())
         return replace(self._limits, tool=tool)
 
     @limits.setter
@@ -105,8 +91,13 @@ class UrRobot:
         """Check every motion for these balls of the flange frame too, a gripper's."""
         self._carried = balls
 
-    def _flange_T_tcp(self) -> Array:
-        """(4, 4), from the state until control was taken."""
+    @property
+    def flange_T_tcp(self) -> Array | None:
+        """Tool centre point (4, 4) that is set on the controller; known once enabled."""
+        return None if self._control is None else self._control.flange_T_tcp
+
+    def _reach(self) -> Array:
+        """The tool centre point (4, 4) in the flange frame, from the state until control was taken."""
         if self.flange_T_tcp is not None:
             return self.flange_T_tcp
         sample = self._stream.latest
@@ -118,22 +109,7 @@ class UrRobot:
         """The newest state; raises `DeviceFault` when the link is lost or silent."""
         if self._stream.fault and self._stream.link_lost:
             raise self._stream.fault
-        return self._as_state(self._stream.latest)
-
-    def _as_state(self, sample: Sample) -> RobotState:
-        nominal = self.arm.forward(sample.joints)
-        tcp_T_flange = None if self.flange_T_tcp is None else se3.inverse(self.flange_T_tcp)
-        return RobotState(
-            joints_rad=sample.joints,
-            joint_speeds_rad_s=sample.joint_speeds,
-            base_T_flange=nominal if tcp_T_flange is None else sample.base_T_tcp @ tcp_T_flange,
-            nominal_base_T_flange=nominal,
-            base_T_tcp=sample.base_T_tcp,
-            wrench=sample.wrench,
-            robot_stamp_s=sample.controller_s,
-            host_stamp_s=time.time() - (time.monotonic() - sample.arrived_s),
-            speed_fraction=sample.speed_fraction,
-        )
+        return self._stream.latest.state(self.arm, self.flange_T_tcp)
 
     def describe(self) -> dict[str, Any]:
         """Model, versions, tool offset, and how far our kinematics are from the controller's own pose.
@@ -162,7 +138,7 @@ class UrRobot:
     @property
     def enabled(self) -> bool:
         """Whether the arm can be moved from here."""
-        return self._control is not None
+        return self._control is not None and self._control.worker.alive
 
     def enable(self) -> None:
         """Take control: upload the control script, read the tool offset, start to supervise.
@@ -172,48 +148,14 @@ class UrRobot:
         """
         sample = self._stream.latest
         recovery.refuse_unready(self.name, self._dashboard, sample)
-        self._take_control()
+        self._control = Control(self.name, self._dashboard, self._stream, self.supervision)
         if self._speed_slider is not None:
             self._set_slider(self._speed_slider)
             self._slider_before = sample.speed_fraction
 
-    def _take_control(self) -> None:
-        worker = Worker("control", self.host)
-        try:
-            worker.ready()
-        except (WorkerGone, HecbenchError) as error:
-            if found := fault_of(self._stream.latest):
-                raise DeviceFault(found[0], self.name, found[1]) from None
-            raise recovery.explained(self.name, str(error)) from None
-        self._control = worker
-        offset = np.array(self._request("call", "getTCPOffset"))
-        self.flange_T_tcp = se3.from_rotvec(offset[3:], offset[:3])
-        self._stream.supervise(self._on_fault)
-
     def _set_slider(self, fraction: float) -> None:
         with Outputs(self.host) as outputs:
             outputs.call("setSpeedSlider", fraction)
-
-    def _on_fault(self, fault: Fault) -> None:
-        """Runs in the supervisor's thread. A controller that stopped by itself needs no telling."""
-        if fault in (Fault.FORCE, Fault.STALE, Fault.LINK_LOST):
-            with suppress(DeviceFault):
-                self._dashboard.ask("stop")
-
-    def _request(self, method: str, *args: object, deadline_s: float = CALL_S) -> Any:
-        """One request to the control worker; its death becomes the fault that caused it."""
-        control = self._control
-        if control is None:
-            raise self._stream.fault or InputError(f"{self.name} is read-only: add --arm to let it move")
-        try:
-            if self._stream.link_lost:
-                control.end()
-                raise WorkerGone("the state stream is gone")
-            return control.request(method, *args, deadline_s=deadline_s)
-        except WorkerGone as error:
-            self._control = None
-            self._on_fault(Fault.LINK_LOST)
-            raise self._stream.fault or DeviceFault(Fault.LINK_LOST, self.name, str(error)) from None
 
     # moving
 
@@ -222,97 +164,56 @@ class UrRobot:
 
         Raises:
             InputError: The target or the path leaves the limits, or the arm is read-only.
-            DeviceFault: It did not arrive, and why.
+            DeviceFault: It did not arrive, and why; or an earlier fault was not acknowledged.
         """
         target, limits = six_joints(joints_rad), self.limits
-        speed = _speed(speed_rad_s, limits.joint_speed_rad_s, "rad/s")
-        start, gap_m = self._ready()
+        speed, acceleration = (
+            _speed(speed_rad_s, limits.joint_speed_rad_s, "rad/s"),
+            limits.joint_acceleration_rad_s2,
+        )
+        control, start, gap_m = self._ready()
         check_motion(self.arm, JointMotion(self.arm, start, target), limits, gap_m)
-        acceleration = limits.joint_acceleration_rad_s2
         expected_s = motion_time_s(float(np.abs(target - start).max()), speed, acceleration)
-        self._move("moveJ", target.tolist(), speed, acceleration, expected_s)
+        self._target = None
+        control.run("moveJ", target.tolist(), speed, acceleration, expected_s)
         self._target = target
 
     def move_linear(self, base_T_flange: Array, *, speed_m_s: float | None = None) -> None:
-        """Straight in space; the path is checked first, and slowed where a joint would be too fast.
+        """The tool centre point straight in space, slowed where a joint would be too fast; the path is checked first.
 
         Raises as `move_joints` does.
         """
         limits = self.limits
-        speed = _speed(speed_m_s, limits.tool_speed_m_s, "m/s")
-        start, gap_m = self._ready()
-        line = LineMotion(self.arm, start, np.asarray(base_T_flange, float), self._flange_T_tcp())
+        speed, acceleration = _speed(speed_m_s, limits.tool_speed_m_s, "m/s"), limits.tool_acceleration_m_s2
+        control, start, gap_m = self._ready()
+        line = LineMotion(self.arm, start, np.asarray(base_T_flange, float), control.flange_T_tcp)
         check_motion(self.arm, line, limits, gap_m)
         vector = [*line.base_T_tcp[:3, 3].tolist(), *se3.so3_log(line.base_T_tcp[:3, :3]).tolist()]
-        acceleration, length = limits.tool_acceleration_m_s2, float(np.linalg.norm(line.shift_m))
-        turn = float(np.abs(np.diff(line.joints, axis=0)).sum(axis=0).max())
         speed = min(speed, line.speed_m_s(limits.joint_speed_rad_s))
-        expected_s = motion_time_s(length, speed, acceleration) + motion_time_s(
-            turn, limits.joint_speed_rad_s, limits.joint_acceleration_rad_s2
+        expected_s = motion_time_s(float(np.linalg.norm(line.shift_m)), speed, acceleration) + motion_time_s(
+            float(np.abs(np.diff(line.joints, axis=0)).sum(axis=0).max()),
+            limits.joint_speed_rad_s,
+            limits.joint_acceleration_rad_s2,
         )
-        self._move("moveL", vector, speed, acceleration, expected_s)
         self._target = None
+        control.run("moveL", vector, speed, acceleration, expected_s)
 
-    def _ready(self) -> tuple[Array, float]:
-        """The joints (6,) rad from which a motion begins; how far apart the controller's tool and ours are there, m."""
-        if self._stream.fault:
-            raise self._stream.fault
-        if self._control is None:
+    def _ready(self) -> tuple[Control, Array, float]:
+        """Control; joints (6,) rad from which a motion begins; how far apart the controller's tool and ours are, m."""
+        control = self._control
+        if fault := self._stream.fault or (control and control.fault):
+            raise fault
+        if control is None:
             raise InputError(f"{self.name} is read-only: add --arm to let it move")
         sample = self._stream.latest
-        ours = self.arm.forward(sample.joints) @ self._flange_T_tcp()
+        ours = self.arm.forward(sample.joints) @ control.flange_T_tcp
         gap_m = float(se3.translation_error_m(sample.base_T_tcp, ours))
         if gap_m > _GAP_M:
             raise InputError(
                 f"{self.name}: the tool centre point is {gap_m:.3f} m from where it was set when control was taken:"
                 " set it back on the pendant, or start again"
             )
-        return sample.joints, gap_m
-
-    def _move(
-        self, name: str, target: list[float], speed: float, acceleration: float, expected_s: float
-    ) -> None:
-        if not self._motion.acquire(blocking=False):
-            raise InputError(f"{self.name} is moving already: stop it or wait")
-        self._stopping.clear()
-        first = self._stream.latest
-        allowed_s = expected_s / max(first.speed_fraction, 0.01) + self.supervision.late_s
-        try:
-            before = self._request("start", name, target, speed, acceleration)
-            if before is None:
-                raise self._why_program_ended()
-            while not self._has_ended(before) and not self._stopping.wait(POLL_S):
-                if self._is_late(first, allowed_s):
-                    raise DeviceFault(Fault.LATE, self.name, f"a motion of {expected_s:.1f} s does not end")
-            if self._stopping.is_set():  # a motion that was braked has ended too, elsewhere
-                raise DeviceFault(Fault.STOPPED, self.name, "stopped on request")
-        except BaseException:
-            self.stop()
-            raise
-        finally:
-            self._motion.release()
-
-    def _is_late(self, first: Sample, allowed_s: float) -> bool:
-        """By this computer's clock, or by a simulated controller's faster one after some patience."""
-        here_s = time.monotonic() - first.arrived_s
-        there_s = self._stream.latest.controller_s - first.controller_s
-        return here_s > allowed_s or (there_s > allowed_s and here_s > self.supervision.late_s)
-
-    def _has_ended(self, before: int) -> bool:
-        operation, running, playing = self._request("progress")
-        if self._stream.fault:
-            raise self._stream.fault
-        if not playing:
-            raise self._why_program_ended()
-        return operation != before and not running
-
-    def _why_program_ended(self) -> DeviceFault:
-        self._stream.wait_for(lambda _: self._stream.fault is not None, _NEWS_S)
-        if self._stream.fault:
-            return self._stream.fault
-        if not self._dashboard.is_remote():
-            return DeviceFault(Fault.LOCAL_MODE, self.name, "the pendant took over")
-        return DeviceFault(Fault.PROGRAM_ENDED, self.name, "the controller ended the control program")
+        return control, sample.joints, gap_m
 
     def settle(self, timeout_s: float = 5.0) -> RobotState:
         """Wait until no joint has moved for a while, and check that the last joint target was reached.
@@ -337,36 +238,23 @@ class UrRobot:
         sample = self._stream.latest
         if (gap_rad := self._gap_rad(sample)) > _ARRIVED_RAD:
             raise DeviceFault(Fault.OFF_TARGET, self.name, f"a joint is {gap_rad:.4f} rad off")
-        return self._as_state(sample)
+        return sample.state(self.arm, self.flange_T_tcp)
 
     def _gap_rad(self, sample: Sample) -> float:
         """How far the farthest joint is from the last joint target; 0 without one."""
         return 0.0 if self._target is None else float(np.abs(sample.joints - self._target).max())
 
     def stop(self) -> None:
-        """Brake now, from any thread; by the dashboard when the client does not answer."""
-        self._stopping.set()
+        """Brake now, from any thread; nothing when read-only."""
         self._target = None
-        if self._control is None:
-            return
-        with suppress(DeviceFault):
-            self._request("call", "stopJ", STOP_RAD_S2, deadline_s=_BRAKE_S)
+        if self._control is not None:
+            self._control.stop()
 
-    @contextmanager
-    def freedrive(self) -> Iterator[None]:
+    def freedrive(self) -> AbstractContextManager[None]:
         """The arm can be guided by hand inside the block."""
-        self._ready()
+        control = self._ready()[0]
         self._target = None
-        if not self._request("call", "freedriveMode"):
-            raise self._why_program_ended()
-        try:
-            yield
-        except BaseException:
-            with suppress(HecbenchError):
-                self._request("call", "endFreedriveMode")
-            raise
-        if not self._request("call", "endFreedriveMode"):
-            raise self._why_program_ended()
+        return control.freedrive()
 
     # after a fault, and the end
 
@@ -376,27 +264,23 @@ class UrRobot:
         Raises:
             DeviceFault: It cannot be made ready.
         """
-        fault = self._stream.fault
+        fault = self._stream.fault or (self._control and self._control.fault)
         if not acknowledge(str(fault) if fault else f"{self.name}: take control again"):
             return False
-        if self._control:
+        if self._control is not None:
             self._control.end()
-            self._control = None
         self._stream.close()
         recovery.make_ready(self.name, self._dashboard)
         self._stream = StateStream(self.host, self.supervision)
         recovery.refuse_unready(self.name, self._dashboard, self._stream.latest)
-        self._take_control()
+        self._control = Control(self.name, self._dashboard, self._stream, self.supervision)
         return True
 
     def close(self) -> None:
         """Stop the arm, end the control script, let go of the controller. May be called twice."""
         control, self._control = self._control, None
-        if control:
-            if self._stream.link_lost:
-                control.end()
-            else:
-                control.leave()
+        if control is not None:
+            control.close()
             if self._slider_before is not None:
                 with suppress(HecbenchError):
                     self._set_slider(self._slider_before)

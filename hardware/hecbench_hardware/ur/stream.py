@@ -12,7 +12,8 @@ import numpy as np
 from hecbench import se3
 from hecbench.errors import HecbenchError, InputError
 from hecbench.se3 import Array
-from hecbench_hardware.devices import DeviceFault, Fault
+from hecbench_hardware.devices import DeviceFault, Fault, RobotState
+from hecbench_hardware.kinematics import Arm
 from hecbench_hardware.ur.process import Worker, WorkerGone
 from hecbench_hardware.ur.worker import SAMPLE
 
@@ -33,6 +34,8 @@ _LINK = (Fault.LINK_LOST, Fault.STALE)
 
 MOST_AGE_S, MOST_FORCE_N = 1.0, 150.0
 """A real arm at its top speed covers half a metre in so long; above this force its controller stops by itself."""
+LAG_S = 0.1
+"""How long a state may wait until this process judges it."""
 
 
 @dataclass(frozen=True)
@@ -51,6 +54,11 @@ class Supervision:
         for name in ("max_age_s", "max_force_n", "late_s"):
             if not getattr(self, name) > 0:
                 raise InputError(f"{name}={getattr(self, name)} must be above 0")
+
+    @property
+    def patience_s(self) -> float:
+        """How old the state that was judged last may be while the arm is on its way."""
+        return self.max_age_s + LAG_S
 
     def refuse_blind(self) -> None:
         """Raise an `InputError` for what a real arm may not be driven with."""
@@ -96,6 +104,21 @@ class Sample:
         """The controller's pose (4, 4)."""
         return se3.from_rotvec(self.tcp_vector[3:], self.tcp_vector[:3])
 
+    def state(self, arm: Arm, flange_T_tcp: Array | None) -> RobotState:
+        """The same for users; the tool offset (4, 4) is unknown until control was taken."""
+        nominal = arm.forward(self.joints)
+        return RobotState(
+            joints_rad=self.joints,
+            joint_speeds_rad_s=self.joint_speeds,
+            base_T_flange=nominal if flange_T_tcp is None else self.base_T_tcp @ se3.inverse(flange_T_tcp),
+            nominal_base_T_flange=nominal,
+            base_T_tcp=self.base_T_tcp,
+            wrench=self.wrench,
+            robot_stamp_s=self.controller_s,
+            host_stamp_s=time.time() - (time.monotonic() - self.arrived_s),
+            speed_fraction=self.speed_fraction,
+        )
+
 
 def fault_of(sample: Sample) -> tuple[Fault, str] | None:
     """Why this controller may not move its arm, and what it says; None when it may."""
@@ -129,6 +152,7 @@ class StateStream:
         self._changed_s = self.latest.arrived_s
         self._news = threading.Condition()
         self._on_fault: Callable[[Fault], None] | None = None
+        self._on_judged: Callable[[float], None] | None = None
         self._closing = False
         self._thread = threading.Thread(target=self._read, name=f"{host} supervisor", daemon=True)
         self._thread.start()
@@ -138,9 +162,9 @@ class StateStream:
         """Process id of the worker."""
         return self._worker.pid
 
-    def supervise(self, on_fault: Callable[[Fault], None]) -> None:
-        """From now on every fault counts, not only a lost link, and is told as it happens."""
-        self._on_fault = on_fault
+    def supervise(self, on_fault: Callable[[Fault], None], on_judged: Callable[[float], None]) -> None:
+        """From now on every fault counts, not only a lost link; each is reported, and when each good state arrived."""
+        self._on_fault, self._on_judged = on_fault, on_judged
 
     def wait_for(self, done: Callable[[Sample], bool], timeout_s: float) -> bool:
         """Wait until a sample satisfies `done`; False after the time-out or when the link is lost."""
@@ -193,6 +217,8 @@ class StateStream:
             self._raise(*found)
         elif force_n > self._supervision.max_force_n:
             self._raise(Fault.FORCE, f"{force_n:.0f} N, {self._supervision.max_force_n:.0f} N allowed")
+        elif self._on_judged and self.fault is None:
+            self._on_judged(sample.arrived_s)
 
     def _raise(self, fault: Fault, detail: str) -> None:
         if self._closing or self.link_lost or (self.fault and fault not in _LINK):

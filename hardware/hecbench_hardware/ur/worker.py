@@ -7,6 +7,7 @@ kernel whose default action ends this process, and the parent reads the end of t
 
 from __future__ import annotations
 
+import mmap
 import os
 import signal
 import struct
@@ -24,7 +25,11 @@ BEGIN_S = 0.02
 """An accepted motion shows in the status some cycles later."""
 WATCHDOG_HZ = 2.0
 """The controller ends the program by itself when it hears nothing for half a second."""
-KICK_S = 0.15
+TEND_S = 0.05
+"""How often the watchdog is fed, or found unfit to be."""
+MOTIONS = ("moveJ", "moveL")
+"""What the parent can drive, and checks."""
+CALLS = ("getTCPOffset", "stopJ", "freedriveMode", "endFreedriveMode")
 STREAM_HZ = 125.0
 STOP_RAD_S2 = 4.0
 SAMPLE = struct.Struct("35d")
@@ -55,23 +60,72 @@ def ends_after(seconds: float) -> Iterator[None]:
         signal.setitimer(signal.ITIMER_REAL, 0)
 
 
-class Control:
-    """The one client that may move the arm. Its methods are what the parent can ask for."""
+class Pulse:
+    """Memory that parent and worker share: when the state arrived that was judged last, and whether that was too late.
 
-    def __init__(self, host: str) -> None:
+    Both use the monotonic clock of one computer. Nothing here can block: a process that hangs leaves an old number.
+    """
+
+    _CELLS = struct.Struct("dd")
+    SIZE = _CELLS.size
+
+    def __init__(self, descriptor: int) -> None:
+        """Of a file of `SIZE` bytes."""
+        self._memory = mmap.mmap(descriptor, self.SIZE)
+
+    def beat(self, arrived_s: float) -> None:
+        """The parent has judged a state, and may go on."""
+        struct.pack_into("d", self._memory, 0, arrived_s)
+
+    def abandon(self) -> None:
+        """The worker has stopped the arm because no state was judged."""
+        struct.pack_into("d", self._memory, 8, 1.0)
+
+    @property
+    def age_s(self) -> float:
+        """Of the state that was judged last."""
+        return time.monotonic() - float(self._CELLS.unpack_from(self._memory)[0])
+
+    @property
+    def abandoned(self) -> bool:
+        """Whether the worker has stopped the arm."""
+        return bool(self._CELLS.unpack_from(self._memory)[1])
+
+
+class Control:
+    """The one client that may move the arm. Its methods are what the parent can ask for.
+
+    While the arm is on its way, or free to be guided, the controller's watchdog is fed only as long as the parent
+    judges states: when the last one is older than `patience_s`, the arm is braked and the script ended. At rest the
+    parent may be busy with other things.
+    """
+
+    def __init__(self, host: str, pulse: Pulse, patience_s: float) -> None:
         """Connect and upload the control script."""
         import rtde_control
 
+        self._pulse, self._patience_s = pulse, patience_s
+        self._under_way = self._free = False
+        self._before = 0
         self._interface = rtde_control.RTDEControlInterface(host)
         self._interface.setWatchdog(WATCHDOG_HZ)
 
     def call(self, name: str, *args: Any) -> Any:
-        """A method of RTDEControlInterface."""
+        """A method of RTDEControlInterface that drives nothing."""
+        if name not in CALLS:
+            raise AttributeError(f"{name} is not one of {', '.join(CALLS)}")
+        if name in ("freedriveMode", "endFreedriveMode"):
+            self._free = name == "freedriveMode"
+        if name == "stopJ":
+            self._under_way = False
         return getattr(self._interface, name)(*args)
 
     def start(self, name: str, *args: Any) -> int | None:
         """Start an asynchronous motion; the number of the one before it, or None when it was not accepted."""
-        before = self.progress()[0]
+        if name not in MOTIONS:
+            raise AttributeError(f"{name} is not one of {', '.join(MOTIONS)}")
+        before = self._before = self.progress()[0]
+        self._under_way = True
         if not getattr(self._interface, name)(*args, True):
             return None
         deadline = time.monotonic() + BEGIN_S
@@ -82,11 +136,20 @@ class Control:
     def progress(self) -> tuple[int, bool, bool]:
         """Number of the motion, whether it runs, and whether the control script does."""
         status = self._interface.getAsyncOperationProgressEx()
-        return status.operationId(), status.isAsyncOperationRunning(), self._interface.isProgramRunning()
+        operation, running = status.operationId(), status.isAsyncOperationRunning()
+        if operation != self._before and not running:
+            self._under_way = False
+        return operation, running, self._interface.isProgramRunning()
 
-    def kick(self) -> None:
-        """Keep the controller's watchdog quiet."""
-        self._interface.kickWatchdog()
+    def tend(self) -> None:
+        """Keep the controller's watchdog quiet, or stop an arm that nobody watches."""
+        if self._pulse.abandoned:
+            return
+        if (self._under_way or self._free) and self._pulse.age_s > self._patience_s:
+            self._pulse.abandon()
+            self.leave()
+        else:
+            self._interface.kickWatchdog()
 
     def leave(self) -> None:
         """Brake and end the script."""
@@ -98,7 +161,7 @@ class Control:
 class Outputs:
     """The client of digital outputs and the speed slider; it needs no script on the controller."""
 
-    def __init__(self, host: str) -> None:
+    def __init__(self, host: str, pulse: Pulse, patience_s: float) -> None:
         """Connect."""
         import rtde_io
 
@@ -108,7 +171,7 @@ class Outputs:
         """A method of RTDEIOInterface."""
         return getattr(self._interface, name)(*args)
 
-    def kick(self) -> None:
+    def tend(self) -> None:
         """The controller does not watch this client."""
 
     def leave(self) -> None:
@@ -118,26 +181,28 @@ class Outputs:
 CLIENTS: dict[str, type[Control] | type[Outputs]] = {"control": Control, "outputs": Outputs}
 
 
-def serve(role: str, host: str, connection: Connection) -> Control | Outputs | None:
+def serve(
+    role: str, host: str, connection: Connection, pulse: Pulse, patience_s: float
+) -> Control | Outputs | None:
     """Answer requests ``(number, method, args, deadline_s)`` until the parent says None or is gone; then leave.
 
     Returns the client, so that its destructor does not run; None when it did not connect.
     """
     try:
         with ends_after(CONNECT_S):
-            client = CLIENTS[role](host)
+            client = CLIENTS[role](host, pulse, patience_s)
     except RuntimeError as error:
         connection.send(str(error))
         return None
     connection.send(None)
-    kicked = time.monotonic()
+    tended = time.monotonic()
     try:
         while True:
-            if time.monotonic() - kicked > KICK_S:
+            if time.monotonic() - tended > TEND_S:
                 with ends_after(CALL_S):
-                    client.kick()
-                kicked = time.monotonic()
-            if not connection.poll(KICK_S):
+                    client.tend()
+                tended = time.monotonic()
+            if not connection.poll(TEND_S):
                 continue
             request = connection.recv()
             if request is None:
@@ -200,11 +265,14 @@ def _sample(client: Any) -> bytes:
     )
 
 
-def main(role: str, host: str, descriptor: str) -> None:
+def main(role: str, host: str, descriptor: str, shared: str, patience_s: str) -> None:
     """Serve one role; leave without the library's destructors, which wait, or abort when the link is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with Connection(int(descriptor)) as connection:
-        client = receive(host, connection) if role == "receive" else serve(role, host, connection)
+        if role == "receive":
+            client = receive(host, connection)
+        else:
+            client = serve(role, host, connection, Pulse(int(shared)), float(patience_s))
         os._exit(client is None)
 
 

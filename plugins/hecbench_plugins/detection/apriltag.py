@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 from hecbench import apriltags
 from hecbench.errors import InputError, TargetNotSeen
 from hecbench.targets import ANY_TAG, AprilTagTarget
+from hecbench_plugins.detection.pictures import each
 
 Array = NDArray[np.float64]
 Grey = NDArray[np.uint8]
@@ -33,13 +35,13 @@ def tags(grey: Grey, family: str) -> dict[int, Array]:
     return {tag.id: tag.corners_px for tag in found}
 
 
-def find(greys: list[Grey | None], target: AprilTagTarget) -> tuple[AprilTagTarget, list[Array | None]]:
+def find(greys: Sequence[Grey | None], target: AprilTagTarget) -> tuple[AprilTagTarget, list[Array | None]]:
     """The tag's corners in each picture; a target of id `ANY_TAG` becomes the only tag in view.
 
     Raises:
         TargetNotSeen: the tag is in no picture, or `ANY_TAG` does not single one out; the ids seen are listed.
     """
-    seen = [{} if grey is None else tags(grey, target.family) for grey in greys]
+    seen = [found or {} for found in each(greys, tags, target.family)]
     counts = Counter(tag_id for found in seen for tag_id in found)
     tag_id = target.id
     if tag_id == ANY_TAG and len(counts) == 1:

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from hecbench.errors import InputError, TargetNotSeen
 from hecbench.targets import CharucoTarget
+from hecbench_plugins.detection.pictures import each
 
 Array = NDArray[np.float64]
 Grey = NDArray[np.uint8]
@@ -27,7 +28,7 @@ def find(greys: Sequence[Grey | None], target: CharucoTarget) -> tuple[CharucoTa
         InputError: the dictionary is unknown, or is not the printed one (the one that fits is named).
     """
     layouts = [target] if target.rows % 2 else [target, replace(target, legacy=not target.legacy)]
-    found = [[None if grey is None else _corners(grey, layout) for grey in greys] for layout in layouts]
+    found = [each(greys, _corners, layout) for layout in layouts]
     counts = [sum(np.isfinite(c[:, 0]).sum() for c in corners if c is not None) for corners in found]
     best = int(np.argmax(counts))
     if counts[best] == 0:

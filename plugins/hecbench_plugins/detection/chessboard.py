@@ -15,6 +15,8 @@ Grey = NDArray[np.uint8]
 
 _WINDOW_PX = (2, 10)
 _LEAST_CONTRAST = 1.2
+_LEAST_HEIGHT_PX = 360
+"""Of the shorter side of the shrunk picture that is searched first; one four times as large takes six times as long."""
 
 
 def corners(grey: Grey, columns: int, rows: int) -> Array | None:
@@ -26,11 +28,14 @@ def corners(grey: Grey, columns: int, rows: int) -> Array | None:
     import cv2
 
     criteria = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 50, 1e-3)
-    for thorough in (0, cv2.CALIB_CB_EXHAUSTIVE):
+    shrink = max(1, 2 ** int(np.log2(min(grey.shape) / _LEAST_HEIGHT_PX)))
+    for size, thorough in {(shrink, 0): None, (1, 0): None, (1, cv2.CALIB_CB_EXHAUSTIVE): None}:
+        small = cv2.resize(grey, None, fx=1 / size, fy=1 / size, interpolation=cv2.INTER_AREA)
         flags = cv2.CALIB_CB_NORMALIZE_IMAGE | thorough
-        found, points = cv2.findChessboardCornersSB(grey, (columns, rows), flags=flags)
+        found, points = cv2.findChessboardCornersSB(small, (columns, rows), flags=flags)
         if not found:
             continue
+        points = size * points + np.float32((size - 1) / 2)
         window = _window(points.reshape(rows, columns, 2))
         points = cv2.cornerSubPix(grey, points, (window, window), (-1, -1), criteria)
         grid = unmirrored(np.asarray(points, float).reshape(rows, columns, 2))

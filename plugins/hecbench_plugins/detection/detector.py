@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,9 +14,9 @@ from hecbench.targets import AprilTagTarget, CharucoTarget, ChessboardTarget, Po
 from hecbench_plugins.detection import apriltag, charuco, chessboard, circles
 from hecbench_plugins.detection.intrinsics import calibrate
 from hecbench_plugins.detection.orientation import choose_turns, turned_grids
+from hecbench_plugins.detection.pictures import Grey, Greys, each
 
 Array = NDArray[np.float64]
-Grey = NDArray[np.uint8]
 Found = list[Array | None]
 
 
@@ -38,7 +39,7 @@ def detect(recording: Recording, *, refit_intrinsics: bool = False) -> Recording
         raise InputError(f"{recording.name}: has no images to detect the target in")
     if recording.target is None:
         raise InputError(f"{recording.name}: does not say what target its images show; describe the target")
-    greys = [_grey(recording, i) for i in range(len(recording))]
+    greys = Greys(recording)
     target, found, grid = _find(greys, recording.target)
     seen = [i for i, corners in enumerate(found) if corners is not None]
     if not seen:
@@ -48,7 +49,8 @@ def detect(recording: Recording, *, refit_intrinsics: bool = False) -> Recording
     corners_px = np.full((len(recording), len(target.points_m), 2), np.nan)
     for i in seen:
         corners_px[i] = found[i]
-    notes = [f"{target.kind} found in {len(seen)} of {sum(grey is not None for grey in greys)} images"]
+    images = sum(image is not None for image in recording.images)
+    notes = [f"{target.kind} found in {len(seen)} of {images} images"]
     if isinstance(target, CharucoTarget) and target != recording.target:
         notes.append(f"its layout is {'legacy' if target.legacy else 'new'}, not as declared (OpenCV 4.6)")
     if isinstance(target, AprilTagTarget) and target != recording.target:
@@ -64,15 +66,7 @@ def detect(recording: Recording, *, refit_intrinsics: bool = False) -> Recording
     return replace(changed, notes=(*recording.notes, f"{recording.name}: " + "; ".join(filter(None, notes))))
 
 
-def _grey(recording: Recording, index: int) -> Grey | None:
-    if recording.images is None or recording.images[index] is None:
-        return None
-    import cv2
-
-    return np.asarray(cv2.cvtColor(recording.image(index), cv2.COLOR_RGB2GRAY), np.uint8)
-
-
-def _find(greys: list[Grey | None], target: Target) -> tuple[Target, Found, tuple[int, int] | None]:
+def _find(greys: Sequence[Grey | None], target: Target) -> tuple[Target, Found, tuple[int, int] | None]:
     """The target with what the images settle, its points in each image, and (columns, rows) of a grid whose
     orientation they do not settle."""
     match target:
@@ -82,28 +76,24 @@ def _find(greys: list[Grey | None], target: Target) -> tuple[Target, Found, tupl
             return *charuco.find(greys, target), None
         case ChessboardTarget():
             shape = target.columns, target.rows
-            return target, _chessboards(greys, *shape), shape if _looks_alike(*shape) else None
+            return target, each(greys, chessboard.corners, *shape), shape if _looks_alike(*shape) else None
         case PointsTarget() if grid := grid_shape(target.points_m):
             if _shows_circles(greys, grid):
-                found = [None if grey is None else circles.centres(grey, *grid) for grey in greys]
+                found = each(greys, circles.centres, *grid)
                 marked = all(centres[1] for centres in found if centres is not None)
                 return target, [centres and centres[0] for centres in found], None if marked else grid
-            return target, _chessboards(greys, *grid), grid if _looks_alike(*grid) else None
+            return target, each(greys, chessboard.corners, *grid), grid if _looks_alike(*grid) else None
     raise InputError(
         "target.points_m: points that form no flat grid cannot be found in images; give corners_px"
     )
 
 
-def _chessboards(greys: list[Grey | None], columns: int, rows: int) -> Found:
-    return [None if grey is None else chessboard.corners(grey, columns, rows) for grey in greys]
-
-
-def _shows_circles(greys: list[Grey | None], grid: tuple[int, int]) -> bool:
+def _shows_circles(greys: Sequence[Grey | None], grid: tuple[int, int]) -> bool:
     """Whether the first picture that shows a chessboard or circles shows circles."""
     for grey in greys:
-        if grey is not None and chessboard.corners(grey, *grid) is not None:
+        if each([grey], chessboard.corners, *grid)[0] is not None:
             return False
-        if grey is not None and circles.centres(grey, *grid) is not None:
+        if each([grey], circles.centres, *grid)[0] is not None:
             return True
     return False
 
@@ -128,7 +118,7 @@ def grid_shape(points_m: Array) -> tuple[int, int] | None:
 
 
 def _calibrated(
-    recording: Recording, target: Target, corners_px: Array, greys: list[Grey | None]
+    recording: Recording, target: Target, corners_px: Array, greys: Sequence[Grey | None]
 ) -> tuple[CameraModel, str]:
     height, width = next(grey.shape for grey in greys if grey is not None)
     try:

@@ -17,7 +17,6 @@ from hecbench.estimate import Estimate, Status
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Column, EvaluatorSpec, Need, ResultSection
-from hecbench_plugins.views.silhouettes import Silhouettes
 
 Array = NDArray[np.float64]
 
@@ -27,6 +26,8 @@ _NEEDS = frozenset({Need.MASKS, Need.ROBOT_MODEL, Need.JOINTS, Need.INTRINSICS})
 
 def overlaps(recording: Recording, parent_T_camera: Array, samples: Sequence[int]) -> list[float]:
     """Intersection over union of the robot drawn at a pose and the masks of these samples."""
+    from hecbench_plugins.views.silhouettes import Silhouettes
+
     silhouettes = Silhouettes(recording)
     found = []
     for sample in samples:

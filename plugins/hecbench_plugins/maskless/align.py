@@ -16,10 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import se3
+from hecbench import se3, threads
 from hecbench.rendering import Renderer, RenderMesh
 from hecbench.rendering.undistort import shrunk_intrinsics
-from hecbench_plugins import threads
 from hecbench_plugins.maskless import kernels
 from hecbench_plugins.views import scene_background
 from hecbench_plugins.views.canvas import Canvas, Images
@@ -172,7 +171,7 @@ class ContourMatcher:
         self._mean_around = np.zeros(size, np.float32)
         self._covered = np.zeros((height, width), np.int16)
         self._buffers = [
-            _Buffers(self.mesh, K, width, height) for _ in range(min(threads.COUNT, len(self.canvas)))
+            _Buffers(self.mesh, K, width, height) for _ in range(min(threads.count(), len(self.canvas)))
         ]
 
     def __call__(

@@ -15,10 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import se3
+from hecbench import se3, threads
 from hecbench.rendering import Renderer, RenderMesh
 from hecbench.rendering.undistort import shrunk_intrinsics
-from hecbench_plugins import threads
 from hecbench_plugins.maskless import kernels
 from hecbench_plugins.views.canvas import Canvas
 
@@ -110,7 +109,7 @@ class Score:
         self._materials = int(material.max()) + 1
         self._face_material = material.reshape(-1)[mesh.face_part].astype(np.int32)
         K = shrunk_intrinsics(canvas.K, *factors)
-        self._renderers = [Renderer(mesh, K, *size) for _ in range(threads.COUNT)]
+        self._renderers = [Renderer(mesh, K, *size) for _ in range(threads.count())]
 
     def limit_region(self, camera_T_parents: Array) -> None:
         """Count mutual information only where some of these poses (n, 4, 4) put the robot, and a little around it.

@@ -11,8 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import se3
-from hecbench_plugins import threads
+from hecbench import se3, threads
 from hecbench_plugins.views.pyramid import Level, View
 
 Array = NDArray[np.float64]

@@ -17,8 +17,7 @@ from hecbench.errors import Refusal
 from hecbench.recording import Mounting, Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Need, SegmenterSpec
-from hecbench_plugins.views.scene_background import FEWEST_VIEWS, background, foreground
-from hecbench_plugins.views.silhouettes import Silhouettes, Uncertainty
+from hecbench_plugins.views.uncertainty import Uncertainty
 
 Mask = NDArray[np.bool_]
 Floats = NDArray[np.float32]
@@ -40,6 +39,8 @@ def by_background(recording: Recording) -> Recording:
     Raises:
         Refusal: the camera moves, there are too few images, or nothing moved before them.
     """
+    from hecbench_plugins.views.scene_background import FEWEST_VIEWS, background, foreground
+
     if recording.mounting is not Mounting.EYE_TO_HAND:
         raise Refusal(
             f"{recording.name}: the camera moves with the flange, so that no background stays: give masks"
@@ -78,6 +79,8 @@ def _with_start(unlike: Floats, recording: Recording, samples: list[int]) -> Mas
     opposite, the shared picture shows the robot, and D is turned round. What lies where no start within the
     uncertainty draws the robot is something else that moves.
     """
+    from hecbench_plugins.views.silhouettes import Silhouettes
+
     start = recording.initial_parent_T_camera
     assert start is not None
     silhouettes, wide = Silhouettes(recording), Silhouettes(recording, _REACH_SHRINK)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,10 @@ from hecbench.errors import Refusal
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Need, SegmenterSpec
-from hecbench_plugins.views.silhouettes import Silhouettes, Uncertainty
+from hecbench_plugins.views.uncertainty import Uncertainty
+
+if TYPE_CHECKING:
+    from hecbench_plugins.views.silhouettes import Silhouettes
 
 _SHRINK = 2
 """Pixels of the image per pixel of the segmentation."""
@@ -41,6 +45,8 @@ class GrabCut:
         Raises:
             Refusal: no start, no images, or the robot is out of sight at the start.
         """
+        from hecbench_plugins.views.silhouettes import Silhouettes
+
         needed = {Need.INITIAL, Need.ROBOT_MODEL, Need.JOINTS, Need.INTRINSICS, Need.IMAGES}
         if missing := needed - recording.offers():
             raise Refusal(f"{recording.name}: grabcut needs {', '.join(sorted(missing))}")

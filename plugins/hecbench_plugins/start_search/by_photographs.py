@@ -10,10 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import se3
+from hecbench import se3, threads
 from hecbench.rendering import Renderer, RenderMesh
 from hecbench.rendering.undistort import shrunk_intrinsics
-from hecbench_plugins import threads
 from hecbench_plugins.start_search.view_sphere import ViewSphere, best_apart, look_at
 from hecbench_plugins.views.canvas import Canvas
 
@@ -45,11 +44,11 @@ def starts(
     """
     views = np.unique(np.linspace(0, len(canvas) - 1, _VIEWS).round().astype(int))
     middle, span = _moving(canvas)
-    shifts = [_Shifts(mesh, canvas.subset(views), foreground[views]) for _ in range(threads.COUNT)]
+    shifts = [_Shifts(mesh, canvas.subset(views), foreground[views]) for _ in range(threads.count())]
     centre = np.array([0.0, 0.0, 1.0])
     rotations = sphere.rotations()
     poses = np.concatenate([look_at(rotations, middle, centre, factor * span) for factor in _DISTANCES])
-    pairs = zip(shifts, np.array_split(poses, threads.COUNT), strict=True)
+    pairs = zip(shifts, np.array_split(poses, threads.count()), strict=True)
     shares = threads.each(lambda pair: [pair[0](pose) for pose in pair[1]], pairs)
     rows = [row for share in shares for row in share]
     found = [pose for pose, _ in rows]

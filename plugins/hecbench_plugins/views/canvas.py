@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hecbench import threads
 from hecbench.errors import InputError, Refusal
 from hecbench.recording import EQUIDISTANT, CameraModel, Recording
 from hecbench.rendering.undistort import shrunk_intrinsics
 from hecbench.robots.posed import PosedRobot
-from hecbench_plugins import threads
 
 Array = NDArray[np.float64]
 Images = NDArray[np.uint8]

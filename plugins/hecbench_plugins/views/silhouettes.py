@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,25 +60,6 @@ class Silhouettes:
     def reach(self, sample: int, starts: Sequence[Array]) -> Mask:
         """Where (H, W) the robot is drawn from any of several parent_T_camera."""
         return np.asarray(np.logical_or.reduce([self.draw(sample, start) for start in starts]))
-
-
-@dataclass(frozen=True)
-class Uncertainty:
-    """How far off a start may be: its camera centre, and its rotation."""
-
-    centre_m: float = 0.1
-    rotation_deg: float = 10.0
-    draws: int = 30
-
-    def around(self, start: Array) -> list[Array]:
-        """The start, then others (4, 4) exactly that far off in random directions, the same at every call."""
-        rng = np.random.default_rng(0)
-        found = [start]
-        for _ in range(self.draws):
-            axis, way = (v / np.linalg.norm(v) for v in rng.normal(size=(2, 3)))
-            turned = start[:3, :3] @ se3.so3_exp(np.deg2rad(self.rotation_deg) * axis)
-            found.append(se3.make(turned, start[:3, 3] + self.centre_m * way))
-        return found
 
 
 def _shrunk(camera: CameraModel, shrink: int) -> CameraModel:

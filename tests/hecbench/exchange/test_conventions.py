@@ -6,7 +6,9 @@ from scipy.spatial.transform import Rotation
 
 from hecbench import se3
 from hecbench.errors import InputError
-from hecbench.exchange.conventions import prove, readings, stillness
+from hecbench.exchange.conventions import prove
+from hecbench.exchange.pose_numbers import readings
+from hecbench.exchange.stillness import stillness
 from hecbench.recording import Mounting
 
 BOTH = tuple(Mounting)

@@ -1,0 +1,188 @@
+"""Masks and cameras by the network, on recordings that it was not trained on.
+
+Run: ``python benchmarks/perception_figures.py masks|cameras RECORDING... --name NAME --out FILE.json``. The recordings
+need joints, a robot model, intrinsics, images and a true camera. A run replaces the figures of its name in FILE.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import time
+from datetime import UTC, datetime
+from pathlib import Path
+
+import msgspec
+import numpy as np
+from hecbench_plugins.perception.card import read_card, write_card
+from hecbench_plugins.perception.card_text import write_page
+
+from hecbench import registry, se3
+from hecbench.estimate import Status
+from hecbench.preparation import load_recording, prepare, segmented
+from hecbench.running import solving
+from hecbench.specs import Kind, SolverSpec
+from hecbench.statistics import bootstrap, wilson
+
+RIGHT_M, RIGHT_DEG = 0.03, 2.0
+"""A camera nearer than this to the truth is right."""
+HELD_MARGIN = 0.22
+"""Of the board's extent, around board and flange: what a robot holds is not in its model."""
+
+
+def truth_masks(recording):
+    """The robot drawn at the true camera, for each sample."""
+    from hecbench_plugins.views.silhouettes import Silhouettes
+
+    silhouettes = Silhouettes(recording)
+    return {int(i): silhouettes.draw(int(i), recording.truth_parent_T_camera) for i in silhouettes.samples}
+
+
+def counted(recording, sample):
+    """Where masks are compared: everywhere but around a board that is held."""
+    area = np.ones((recording.camera.height, recording.camera.width), bool)
+    corners = None if recording.corners_px is None else recording.corners_px[sample]
+    if corners is not None and np.isfinite(corners).any():
+        import cv2
+
+        corners = corners[np.isfinite(corners).all(1)]
+        camera_T_flange = (
+            se3.inverse(recording.truth_parent_T_camera) @ prepare(recording).base_T_flange[sample]
+        )
+        p = camera_T_flange[:3, 3]
+        K = recording.camera.K
+        flange, _ = cv2.projectPoints(p[None], np.zeros(3), np.zeros(3), K, recording.camera.distortion)
+        points = np.vstack([corners, flange.reshape(1, 2)])
+        margin = HELD_MARGIN * (corners.max(0) - corners.min(0)).max()
+        x0, y0, x1, y1 = np.r_[points.min(0) - margin, points.max(0) + margin].clip(0, 1e5).astype(int)
+        area[y0:y1, x0:x1] = False
+    return area
+
+
+def masks(recording, segmenter):
+    """Overlaps with the truth, outside of what is held and everywhere, and CPU seconds per picture."""
+    began = time.process_time()
+    found = segmented(recording, segmenter)
+    seconds = (time.process_time() - began) / len(recording)
+    if found.refusal:
+        return {"refused": found.refusal}
+    outside, everywhere = [], []
+    for sample, truth in truth_masks(recording).items():
+        mask, area = found.recording.mask(sample), counted(recording, sample)
+        everywhere.append((mask & truth).sum() / (mask | truth).sum())
+        outside.append((mask & truth & area).sum() / max(1, ((mask | truth) & area).sum()))
+    return {"outside": outside, "everywhere": everywhere, "seconds": seconds}
+
+
+def summary(values):
+    interval = bootstrap(values)
+    return {
+        "n": len(values),
+        "mean": round(interval.value, 4),
+        "interval": [round(interval.low, 4), round(interval.high, 4)],
+        "median": round(float(np.median(values)), 4),
+        "percentile_5": round(float(np.percentile(values, 5)), 4),
+        "least": round(float(np.min(values)), 4),
+    }
+
+
+def away(truth, metres, degrees, rng):
+    """A start that is off by exactly so much, in random directions."""
+    turn, shift = rng.normal(size=(2, 3))
+    moved = truth @ se3.from_rotvec(np.deg2rad(degrees) * turn / np.linalg.norm(turn), np.zeros(3))
+    moved[:3, 3] += metres * shift / np.linalg.norm(shift)
+    return moved
+
+
+def cameras(recording, options):
+    """Errors in mm and deg of each draw of some views; None where there is no answer."""
+    from dataclasses import replace
+
+    spec = registry.load().get(Kind.SOLVER, options.solver, SolverSpec)
+    rows = []
+    for draw in range(options.draws):
+        rng = np.random.default_rng((options.seed, draw))
+        views = np.sort(rng.permutation(len(recording))[: options.views])
+        start = away(recording.truth_parent_T_camera, options.start[0], options.start[1], rng)
+        part = replace(recording.subset(views), initial_parent_T_camera=start, corners_px=None, target=None)
+        settings = solving.Options(seed=draw, segmenter=options.segmenter)
+        estimate = next(iter(solving.solve(part, [spec], settings)))
+        if estimate.status is not Status.OK:
+            print(f"{recording.name} draw {draw}: {estimate.status} {estimate.reason}", file=sys.stderr)
+            rows.append(None)
+            continue
+        T, truth = estimate.parent_T_camera, recording.truth_parent_T_camera
+        mm = 1e3 * float(se3.translation_error_m(truth, T))
+        rows.append((mm, float(np.rad2deg(se3.rotation_error_rad(truth, T)))))
+        print(f"{recording.name} draw {draw}: {rows[-1][0]:.1f} mm {rows[-1][1]:.2f} deg", file=sys.stderr)
+    return rows
+
+
+def camera_summary(rows):
+    answered = [row for row in rows if row is not None]
+    right = sum(mm < 1e3 * RIGHT_M and deg < RIGHT_DEG for mm, deg in answered)
+    rate = wilson(right, len(rows))
+    found = {"n": len(rows), "answered": len(answered), "right": right}
+    found["right_interval"] = [round(rate.low, 3), round(rate.high, 3)]
+    if answered:
+        found["median_mm"], found["median_deg"] = np.round(np.median(answered, 0), 2).tolist()
+        found["worst_mm"], found["worst_deg"] = np.round(np.max(answered, 0), 2).tolist()
+    return found
+
+
+def main():
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("what", choices=("masks", "cameras"))
+    options.add_argument("recordings", nargs="+", type=Path)
+    options.add_argument("--out", type=Path, required=True)
+    options.add_argument("--name", required=True, help="of the group of recordings")
+    options.add_argument("--segmenter", default="learned")
+    options.add_argument("--solver", default="keypoints")
+    options.add_argument("--views", type=int, default=10)
+    options.add_argument("--draws", type=int, default=20, help="of each recording")
+    options.add_argument("--start", type=float, nargs=2, default=(0.1, 8.0), metavar=("M", "DEG"))
+    options.add_argument("--seed", type=int, default=0)
+    options.add_argument("--card", type=Path, help="folder of the network, whose card gets the figures, too")
+    o = options.parse_args()
+    recordings = [load_recording(path) for path in o.recordings]
+    if o.what == "masks":
+        name = f"masks, {o.name}, {o.segmenter}"
+        each = [masks(recording, o.segmenter) for recording in recordings]
+        figures = {
+            where: summary([v for one in each for v in one[where]])
+            for where in ("outside", "everywhere")
+            if all(where in one for one in each)
+        }
+        figures["cpu_seconds_per_picture"] = round(
+            float(np.median([one.get("seconds", np.nan) for one in each])), 3
+        )
+    else:
+        if o.solver == "keypoints":
+            o.segmenter = None
+        given = f", masks {o.segmenter}, start {o.start[0]} m {o.start[1]} deg" if o.segmenter else ""
+        name = f"cameras, {o.name}, {o.solver}, {o.views} views{given}"
+        figures = camera_summary([row for recording in recordings for row in cameras(recording, o)])
+    commit = subprocess.run(
+        ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=True
+    ).stdout
+    figures |= {
+        "command": " ".join(["python", "benchmarks/perception_figures.py", *sys.argv[1:]]),
+        "commit": commit.strip(),
+        "date": datetime.now(UTC).date().isoformat(),
+        "seed": o.seed,
+    }
+    known = json.loads(o.out.read_text()) if o.out.exists() else {}
+    o.out.parent.mkdir(parents=True, exist_ok=True)
+    o.out.write_text(json.dumps(known | {name: figures}, indent=1) + "\n")
+    print(name, json.dumps(figures, indent=1))
+    if o.card:
+        card, _ = read_card(o.card)
+        card = msgspec.structs.replace(card, figures=card.figures | {name: figures})
+        write_card(o.card, card)
+        write_page(o.card, card)
+
+
+if __name__ == "__main__":
+    main()

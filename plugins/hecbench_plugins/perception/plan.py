@@ -1,0 +1,63 @@
+"""The settings of a training run, checked before anything heavy is loaded."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from hecbench.errors import InputError
+
+STRIDE = 32
+"""The sides of every picture that the network takes are multiples of this, px."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Settings of a run.
+
+    Attributes:
+        robots: names or URDF files.
+        out: folder for the checkpoint, the curve and the model.
+        hours: after so many the run ends; the rate falls to its end by then.
+        steps: the same by steps, whichever is first; None: no limit.
+        size: px of the drawn pictures, a multiple of 32.
+        pictures_per_step: drawn anew.
+        capacity: pictures that are kept.
+        start_from: a checkpoint whose averaged weights are the start.
+        backgrounds: a folder of photographs without a robot.
+    """
+
+    robots: tuple[str, ...]
+    out: Path
+    hours: float
+    steps: int | None = None
+    seed: int = 0
+    size: int = 192
+    batch: int = 8
+    rate: float = 1.5e-3
+    pictures_per_step: int = 1
+    capacity: int = 8192
+    threads: int = 1
+    start_from: Path | None = None
+    backgrounds: Path | None = None
+
+    def check(self) -> None:
+        """Refuse what cannot be run.
+
+        Raises:
+            InputError: naming the option and the cure.
+        """
+        if not self.hours > 0:
+            raise InputError(f"--hours must be positive, is {self.hours}")
+        if self.steps is not None and self.steps < 1:
+            raise InputError(f"--steps must be 1 or more, is {self.steps}")
+        if self.size < 2 * STRIDE or self.size % STRIDE:
+            raise InputError(f"--size must be a multiple of {STRIDE}, {2 * STRIDE} or more, is {self.size}")
+        if self.batch < 2:
+            raise InputError(f"--batch must be 2 or more, is {self.batch}")
+
+    def __str__(self) -> str:
+        settings = (
+            f"{self.size} px, batch {self.batch}, rate {self.rate:g}, {self.hours:g} h, seed {self.seed}"
+        )
+        return settings + (f", started from {self.start_from.name}" if self.start_from else "")
