@@ -6,14 +6,16 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 from hecbench import diagnose, registry, threads
 from hecbench.estimate import Estimate, Status, Termination
 from hecbench.preparation import load_recording, prepare, segmented
 from hecbench.recording import Recording
+<<<<<<< HEAD
 from hecbench.running import pool
 from hecbench.running.isolation import Ended
+=======
+from hecbench.running.calibrating import evidence_from
+>>>>>>> main
 from hecbench.running.solving import Options, each_solved, provenance
 from hecbench.specs import Kind, SolverSpec, SuiteSpec
 from hecbench.storage import evidence, store
@@ -65,14 +67,9 @@ def execute(task: Task, options: Options) -> tuple[list[Estimate], Evidence | No
         replace(estimate, suite=task.suite or "files", level=task.level, item=task.item)
         for estimate in each_solved(prepared, specs, options, origin)
     ]
-    return estimates, None if task.path is None else _examined(recording, ready)
-
-
-def _examined(recording: Recording, prepared: Recording) -> Evidence:
-    findings = diagnose.check(recording, prepared)
-    influence = next((dict(f.per_sample) for f in findings if f.id == "influence"), {})
-    influence_mm = np.array([influence.get(sample, np.nan) for sample in recording.sample_ids])
-    return evidence.collect(prepared, recording.sha256, [f.to_json() for f in findings], influence_mm)
+    if task.path is None:
+        return estimates, None
+    return estimates, evidence_from(recording, ready, diagnose.check(recording, ready))
 
 
 def remaining(tasks: Iterable[Task], done: Iterable[Estimate], options: Options) -> list[Task]:

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from hecbench import __version__, registry
+from hecbench import __version__, lens, registry
 from hecbench.errors import InputError, InvalidAnswer, Refusal, SolverFailure
 from hecbench.estimate import Estimate, Status, Termination
 from hecbench.preparation import Segmented, prepare, segmented
@@ -188,6 +188,9 @@ def _unanswered(
 
 
 def _labelled(estimate: Estimate, blind: Recording, spec: SolverSpec, seconds: float) -> Estimate:
+    own, given = estimate.camera, blind.camera
+    if own is not None and given is not None and not lens.same(own, given):
+        estimate = replace(estimate, diagnostics={**estimate.diagnostics, "camera_changed": True})
     return replace(
         estimate,
         solver=spec.name,
