@@ -30,14 +30,10 @@ if TYPE_CHECKING:
 @choices.held_out
 @choices.check
 @choices.timeout
-<<<<<<< HEAD
 @choices.memory
-@click.option("--out", type=choices.FOLDER, help="Write each estimate to DIR/<solver>.json.")
-=======
 @click.option(
     "--out", type=choices.FOLDER, help="Write each estimate to DIR/<solver>.json, for `report` and `export`."
 )
->>>>>>> main
 @choices.threads
 @choices.no_cache
 @choices.seed
@@ -69,18 +65,7 @@ def solve(
         raise HecbenchError(
             f"{recording}: no ready solver can use what it offers: {', '.join(sorted(loaded.offers()))}"
         )
-<<<<<<< HEAD
     options = choices.run_options(seed, held_out, segmenter, timeout_s, memory_mb)
-    ready = preparation.prepare(loaded)
-    prepared = preparation.segmented(ready, segmenter)
-    for note in prepared.recording.notes:
-        console.say(note)
-    findings = [finding.to_json() for finding in diagnose.check(loaded, ready)] if check else []
-    critical = console.print_critical(findings, loaded.name)
-    estimates = []
-=======
-    options = choices.run_options(seed, held_out, segmenter, timeout_s)
->>>>>>> main
     with console.Progress(specs) as progress:
         examined = calibrating.examine(loaded, segmenter, check)
         for note in examined.segmented.recording.notes:

@@ -10,12 +10,9 @@ from hecbench import diagnose, registry, threads
 from hecbench.estimate import Estimate, Status, Termination
 from hecbench.preparation import load_recording, prepare, segmented
 from hecbench.recording import Recording
-<<<<<<< HEAD
 from hecbench.running import pool
-from hecbench.running.isolation import Ended
-=======
 from hecbench.running.calibrating import evidence_from
->>>>>>> main
+from hecbench.running.isolation import Ended
 from hecbench.running.solving import Options, each_solved, provenance
 from hecbench.specs import Kind, SolverSpec, SuiteSpec
 from hecbench.storage import evidence, store
