@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 @choices.held_out
 @choices.check
 @choices.timeout
+@choices.memory
 @click.option(
     "--out", type=choices.FOLDER, help="Write each estimate to DIR/<solver>.json, for `report` and `export`."
 )
@@ -47,6 +48,7 @@ def solve(
     held_out: bool | None,
     check: bool,
     timeout_s: float | None,
+    memory_mb: int | None,
     out: Path | None,
     seed: int,
     as_json: bool,
@@ -63,7 +65,7 @@ def solve(
         raise HecbenchError(
             f"{recording}: no ready solver can use what it offers: {', '.join(sorted(loaded.offers()))}"
         )
-    options = choices.run_options(seed, held_out, segmenter, timeout_s)
+    options = choices.run_options(seed, held_out, segmenter, timeout_s, memory_mb)
     with console.Progress(specs) as progress:
         examined = calibrating.examine(loaded, segmenter, check)
         for note in examined.segmented.recording.notes:
