@@ -11,8 +11,13 @@ from hecbench_hardware.kinematics import ARMS
 from hecbench_hardware.ur.robot import UrRobot
 from hecbench_hardware.ur.stream import Supervision
 
-PATIENT = Supervision(max_age_s=1.0, late_s=1.0)
+PATIENT = Supervision(max_age_s=1.0, late_s=10.0, leniency=10.0)
 """A busy test machine delays the stream; a laboratory's does not."""
+
+
+@pytest.fixture
+def patient():
+    return PATIENT
 
 
 @pytest.fixture(scope="session")

@@ -10,7 +10,7 @@ from hecbench_hardware.controller_sim.inputs_outputs import BANKS, TOOL_VOLTAGES
 from hecbench_hardware.controller_sim.signals import BITS, REGISTERS
 from hecbench_hardware.controller_sim.urscript.functions import Builtin, builtins
 from hecbench_hardware.controller_sim.urscript.machine import Machine
-from hecbench_hardware.controller_sim.urscript.values import Value, number, truth
+from hecbench_hardware.controller_sim.urscript.values import Value, number, truth, whole
 
 _TOOL_PORT = 8
 """`set_digital_out` counts the tool's terminals from here."""
@@ -22,7 +22,7 @@ def _terminal(bank: str, n: Value, what: str = "n") -> int:
 
 
 def _whole(n: Value, count: int, what: str) -> int:
-    if not 0 <= number(n, what) < count or int(n) != n:
+    if not 0 <= whole(n, what) < count:
         raise ScriptError(f"{what} must be a whole number from 0 to {count - 1}, not {n}")
     return int(n)
 
