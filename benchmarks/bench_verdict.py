@@ -3,8 +3,8 @@
 Run: ``python benchmarks/bench_verdict.py [--recordings 200] [--jobs 2] [KIND ...]``. Kinds: the presets of the suite
 `markers`, ``real-N`` (N samples drawn from the recording given by --real), ``fault-NAME``, ``lens`` (the distortion of
 the camera forgotten) and ``size`` (K of another image size). A line for each kind: how often the recommended answer is
-within 1.5 x the best method + 0.5 mm, how often the 95 % interval holds the true error, and the grades; rates with their
-95 % intervals. A recording costs one to four seconds of a core, all kinds at 200 hours.
+within 1.5 x the best method + 0.5 mm, how often the 95 % interval holds the true error, and the grades; rates with
+their 95 % intervals. A recording costs one to four seconds of a core, all kinds at 200 hours.
 """
 
 import argparse
@@ -34,7 +34,8 @@ from hecbench.workspace import apart_m, points_in_parent
 SEED = 1000
 PRESETS = ("tag_2m", "small_tag_2m", "board_2m")
 REAL = tuple(f"real-{count}" for count in (8, 12, 20, 40))
-WRONG = (*(f"fault-{name}" for name in FAULTS), "lens", "size")
+SEEDED = {f"fault-{name.replace(' ', '-')}": fault for name, fault in FAULTS.items()}
+WRONG = (*SEEDED, "lens", "size")
 DISTORTION = np.array([-0.3, 0.1, 0.001, -0.001, 0.0])
 """Of a usual 6 mm lens, forgotten in the kind ``lens``."""
 TWICE_TOLERANCE_MM = 10.0
@@ -66,7 +67,7 @@ def recording_of(kind, index, real):
         good = make("board_2m", index, SEED)
         K = good.camera.K * np.array([[1.5], [1.5], [1.0]])
         return replace(good, camera=replace(good.camera, K=K), camera_T_target=None)
-    fault = FAULTS[kind.removeprefix("fault-")]
+    fault = SEEDED[kind]
     good = arm_recording(load_robot("ur5e"), rng) if fault.needs_joints else make("board_2m", index, SEED)
     good = preparation.prepare(good) if fault.needs_target_poses else good
     return fault.seed(good, rng)

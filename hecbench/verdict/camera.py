@@ -14,8 +14,8 @@ _DETERMINED = 0.5
 _FAR = 3.0
 """Posterior sigmas: a parameter of K that moved farther contradicts the given camera."""
 _WORTH = 0.6
-"""Of the fixed camera's rms px on left-out samples: what a real lens leaves over beside its model lets any free parameter
-gain some ten per cent; a camera that is wrong for its recording costs more."""
+"""Of the fixed camera's rms px on left-out samples: what a real lens leaves over beside its model lets any free
+parameter gain some ten per cent; a camera that is wrong for its recording costs more."""
 
 
 def contradicts(free: Answer, fixed: Answer, given: CameraModel | None) -> bool:
