@@ -8,6 +8,7 @@ import is imported by the verb that uses it.
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from importlib import metadata
 from pathlib import Path
@@ -40,6 +41,7 @@ class _Verbs(click.Group):
 
 def main() -> None:
     """Run the command line; errors become one line and an exit code, never a traceback."""
+    signal.signal(signal.SIGTERM, _interrupt)
     try:
         code = cli.main(standalone_mode=False)
     except click.ClickException as error:
@@ -51,10 +53,17 @@ def main() -> None:
     except (click.Abort, KeyboardInterrupt):
         click.echo("hecbench: interrupted; results written so far are kept", err=True)
         code = 130
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except OSError as error:
+        if isinstance(error, BrokenPipeError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        else:  # a full disk, a folder that may not be written
+            click.echo(f"hecbench: {error.filename or 'the output'}: {error.strerror or error}", err=True)
         code = 1
     sys.exit(code)
+
+
+def _interrupt(number: int, frame: object) -> None:
+    raise KeyboardInterrupt
 
 
 @click.group(cls=_Verbs, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})

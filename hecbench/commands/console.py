@@ -45,9 +45,9 @@ def print_table(table: Table) -> None:
     from rich.text import Text
 
     console = Console(width=None if sys.stdout.isatty() else _PIPE_WIDTH)
-    shown = RichTable(title=table.title, title_justify="left", header_style="bold")
+    shown = RichTable(title=Text(table.title), title_justify="left", header_style="bold")
     for number, name in enumerate(table.header):
-        shown.add_column(name, justify="left" if number < table.left else "right", overflow="fold")
+        shown.add_column(Text(name), justify="left" if number < table.left else "right", overflow="fold")
     for row in table.rows:
         shown.add_row(*map(Text, row))
     console.print(shown)
@@ -143,7 +143,7 @@ class Progress:
         console = Console(stderr=True)
         columns = (
             SpinnerColumn(),
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", markup=False),
             BarColumn(),
             TimeElapsedColumn(),
             TextColumn("left"),
@@ -182,7 +182,7 @@ class Progress:
             self._bar.advance(self._task, self._weight(self._at_work))
         if self._shown:
             self._bar.console.print(
-                f"{estimate.solver}: {estimate.status}, {estimate.seconds:.2g} s", style="dim"
+                f"{estimate.solver}: {estimate.status}, {estimate.seconds:.2g} s", style="dim", markup=False
             )
 
 

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 @choices.held_out
 @choices.check
 @choices.timeout
+@choices.memory
 @click.option(
     "--out", type=choices.FOLDER, help="Write each estimate to DIR/<solver>.json, for `report` and `export`."
 )
@@ -47,6 +48,7 @@ def solve(
     held_out: bool | None,
     check: bool,
     timeout_s: float | None,
+    memory_mb: int | None,
     out: Path | None,
     seed: int,
     as_json: bool,
@@ -63,7 +65,7 @@ def solve(
         raise HecbenchError(
             f"{recording}: no ready solver can use what it offers: {', '.join(sorted(loaded.offers()))}"
         )
-    options = choices.run_options(seed, held_out, segmenter, timeout_s)
+    options = choices.run_options(seed, held_out, segmenter, timeout_s, memory_mb)
     with console.Progress(specs) as progress:
         examined = calibrating.examine(loaded, segmenter, check)
         for note in examined.segmented.recording.notes:
@@ -90,6 +92,7 @@ def solve(
 
 def _save(estimates: Sequence[Estimate], examined: Examined, verdict: Verdict | None, out: Path) -> None:
     """A file for each estimate, and what `report` shows beside them."""
+    from hecbench.report import pictures
     from hecbench.storage import evidence, results
 
     for estimate in estimates:
@@ -97,3 +100,5 @@ def _save(estimates: Sequence[Estimate], examined: Examined, verdict: Verdict | 
     evidence.save(examined.evidence(), out)
     if verdict is not None:
         verdict.save(out / results.VERDICT_NAME)
+    if verdict is not None and verdict.recommended is not None:
+        pictures.write(examined.segmented.recording, verdict.recommended, out)

@@ -132,14 +132,6 @@ class RobotModel:
     def _link_indices(self) -> dict[str, int]:
         return {link: index for index, link in enumerate(self.links)}
 
-    def moved_by(self, joint_name: str) -> NDArray[np.bool_]:
-        """Which links (L,) move with a joint: its child, all that hangs on it, and those of mimic joints."""
-        moved = np.zeros(len(self.links), bool)
-        for joint in self.joints:
-            turns = joint_name in (joint.name, joint.leader)
-            moved[self.link_index(joint.child)] = turns or moved[self.link_index(joint.parent)]
-        return moved
-
     def without(self, patterns: Iterable[str]) -> RobotModel:
         """The model without the parts whose ``link/material`` matches a shell pattern; each must match."""
         patterns = tuple(patterns)
