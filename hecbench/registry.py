@@ -112,9 +112,8 @@ class Registry:
         found = [plugin for plugin in self.select(kind) if plugin.name == plain]
         if not found:
             names = ", ".join(spec.name for spec in self.ready(kind, spec_type)) or "none"
-            raise InputError(
-                f"no {kind} is called '{plain}'{meant(plain, names.split(', '))}: choose one of {names}"
-            )
+            hint = meant(plain, names.split(", "))
+            raise InputError(f"no {kind} is called '{plain}': choose one of {names}{hint}")
         plugin = found[0]
         if plugin.status is not PluginStatus.READY or not isinstance(plugin.spec, spec_type):
             raise InputError(f"{kind} '{plain}' is {plugin.status}: {plugin.detail}")
@@ -146,7 +145,7 @@ def _settings(kind: Kind, name: str) -> tuple[str, dict[str, str]]:
 def meant(word: str, known: Iterable[str]) -> str:
     """ ", did you mean ...?" where something known is spelled nearly alike, else nothing."""
     near = get_close_matches(word.lower(), list(known), n=2)
-    return f", did you mean {' or '.join(near)}?" if near else ""
+    return f"; did you mean {' or '.join(near)}?" if near else ""
 
 
 @cache
