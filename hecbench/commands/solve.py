@@ -94,6 +94,7 @@ def solve(
 
 def _save(estimates: Sequence[Estimate], examined: Examined, verdict: Verdict | None, out: Path) -> None:
     """A file for each estimate, and what `report` shows beside them."""
+    from hecbench.report import pictures
     from hecbench.storage import evidence, results
 
     for estimate in estimates:
@@ -101,3 +102,5 @@ def _save(estimates: Sequence[Estimate], examined: Examined, verdict: Verdict | 
     evidence.save(examined.evidence(), out)
     if verdict is not None:
         verdict.save(out / results.VERDICT_NAME)
+    if verdict is not None and verdict.recommended is not None:
+        pictures.write(examined.segmented.recording, verdict.recommended, out)
