@@ -53,6 +53,21 @@ def test_ranks_are_shared_where_intervals_overlap():
     assert statistics.shared_ranks([Interval(2, np.nan, np.nan), Interval(1, np.nan, np.nan)]) == [2, 1]
 
 
+def test_cluster_bootstrap_of_unequal_clusters_agrees_with_resampling_by_hand(rng):
+    sizes = [1, 2, 20, 3, 1, 30, 2, 5]
+    clusters = np.repeat(np.arange(len(sizes)), sizes)
+    values = rng.normal(size=len(sizes))[clusters] + 0.1 * rng.normal(size=len(clusters))
+    found = statistics.cluster_bootstrap(values, clusters)
+    groups = [values[clusters == k] for k in range(len(sizes))]
+    means = [
+        np.concatenate([groups[k] for k in rng.integers(0, len(groups), len(groups))]).mean()
+        for _ in range(4000)
+    ]
+    low, high = np.percentile(means, [2.5, 97.5])
+    assert found.value == pytest.approx(values.mean())
+    assert (found.low, found.high) == pytest.approx((low, high), abs=0.08 * (high - low))
+
+
 def test_intervals_do_not_depend_on_the_order_of_the_values():
     rng = np.random.default_rng(1)
     values, clusters = rng.normal(0, 1, 40), np.repeat(np.arange(10), 4)
@@ -69,3 +84,7 @@ def test_fewer_than_five_values_have_no_interval(count):
     assert np.isnan(statistics.cluster_bootstrap(np.repeat(values, 3), np.repeat(np.arange(count), 3)).high)
     five = statistics.bootstrap(np.arange(5.0))
     assert five.low < five.value < five.high
+
+
+def test_root_mean_square():
+    assert statistics.root_mean_square([3.0, -4.0]) == pytest.approx(np.sqrt(12.5))

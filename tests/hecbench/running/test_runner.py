@@ -156,6 +156,13 @@ def test_an_interrupted_run_is_finished_by_resume(tmp_path):
     assert comparable(resumed) == comparable(whole)
 
 
+def test_resume_runs_another_seed_again(tmp_path):
+    for seed, expected in ((0, 4), (0, 0), (1, 4), (0, 0)):
+        ran = []
+        runner.run(tasks(2), Options(seed=seed), out=tmp_path / "o", resume=True, on_result=ran.extend)
+        assert len(ran) == expected
+
+
 def test_resume_runs_a_changed_recording_again(tmp_path):
     folder = tmp_path / "cell"
     for seed, expected in ((0, 1), (0, 0), (1, 1)):
@@ -196,3 +203,16 @@ def test_a_cluster_gives_the_same_results(tmp_path):
 def test_a_scheduler_that_does_not_answer_is_named(tmp_path, executor):
     with pytest.raises(InputError, match="--executor"):
         runner.run(tasks(1), Options(), out=tmp_path, executor=executor)
+
+
+def test_solvers_of_other_names_and_seeds_draw_other_numbers(exact_rig):
+    def draws(recording, *, rng):
+        return Estimate(np.eye(4), diagnostics={"draw": rng.random()})
+
+    named = [replace(spec(draws), name=name) for name in ("one", "two")]
+    found = [
+        estimate.diagnostics["draw"]
+        for seed in (0, 1)
+        for estimate in solving.solve(exact_rig, named, Options(seed=seed, held_out=False))
+    ]
+    assert len(set(found)) == 4
