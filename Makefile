@@ -2,7 +2,7 @@ PYTHON ?= python3
 BIN := .venv/bin
 TEST_ARGS ?=
 
-.PHONY: demo test graphics lint docs bench mutants clean
+.PHONY: demo test graphics lint docs bench mutants fuzz clean
 
 demo: .venv/base
 	$(BIN)/hecbench demo --out out/demo
@@ -26,6 +26,9 @@ docs: .venv/docs
 
 mutants: .venv/dev
 	$(BIN)/python benchmarks/mutants.py $(TEST_ARGS)
+
+fuzz: .venv/dev
+	$(BIN)/python benchmarks/fuzz.py $(TEST_ARGS)
 
 bench: .venv/dev
 	$(BIN)/python -m pytest benchmarks -p no:xdist --benchmark-only --timeout=0 -s $(TEST_ARGS)

@@ -78,11 +78,6 @@ class RobotView:
         self._wide = Renderer(coarse, *_sized(camera.K, size, _CANVAS, _COARSE_SHRINK))
         self._small = Renderer(coarse, *_sized(camera.K, size, 1, _COARSE_SHRINK))
 
-    @property
-    def limits_rad(self) -> Array:
-        """(J, 2) of the model's joints."""
-        return self._robot.model.limits(self._robot.joint_names)
-
     def look(self, joints_rad: ArrayLike, parent_T_camera: Array) -> ViewInformation:
         """What these joints (J,) would show to a camera."""
         poses = se3.inverse(parent_T_camera) @ self._robot.link_poses(np.asarray(joints_rad, float))

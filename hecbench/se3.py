@@ -219,3 +219,18 @@ def to_quat_xyzw(a_T_b: ArrayLike) -> Array:
 def to_quat_wxyz(a_T_b: ArrayLike) -> Array:
     """Quaternions (..., 4) in the order w, x, y, z with w >= 0 of transforms (..., 4, 4)."""
     return np.roll(to_quat_xyzw(a_T_b), 1, axis=-1)
+
+
+def to_rpy(rotation: ArrayLike) -> Array:
+    """Roll, pitch, yaw (3,) rad of a rotation (3, 3) about the fixed axes x, y, z, as in URDF.
+
+    At a pitch of 90 degrees, where only the sum or difference of the others is known, yaw is zero.
+    """
+    from scipy.spatial.transform import Rotation
+
+    rotation = np.asarray(rotation, float)
+    pitch = np.arctan2(-rotation[2, 0], np.hypot(rotation[0, 0], rotation[1, 0]))
+    if abs(rotation[2, 0]) > 1 - 1e-12:
+        roll = np.arctan2(np.sign(pitch) * rotation[0, 1], np.sign(pitch) * rotation[0, 2])
+        return np.array([roll, pitch, 0.0])
+    return np.asarray(Rotation.from_matrix(rotation).as_euler("xyz"))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import partial
@@ -318,4 +318,3 @@ AnySpec = (
     | PerceptionSpec
     | DeviceSpec
 )
-SpecIterable = Iterable[AnySpec]

@@ -69,6 +69,13 @@ timeout = click.option(
     metavar="S",
     help="Seconds that a solver may take each time it is called; default: no limit.",
 )
+memory = click.option(
+    "--memory",
+    "memory_mb",
+    type=click.IntRange(min=100),
+    metavar="MB",
+    help="Memory that a solver may take each time it is called; default: no limit.",
+)
 
 
 def run_options(
@@ -76,10 +83,13 @@ def run_options(
     held_out: bool | None = None,
     segmenter: str | None = None,
     timeout_s: float | None = None,
+    memory_mb: int | None = None,
 ) -> Options:
     """What holds for a whole run, with the command line that makes it again."""
     from hecbench.running.solving import Options
 
     words = ["hecbench", *(word for word in sys.argv[1:] if word != "--resume")]
     command = shlex.join(words)
-    return Options(seed, held_out, command=command, segmenter=segmenter, timeout_s=timeout_s)
+    return Options(
+        seed, held_out, command=command, segmenter=segmenter, timeout_s=timeout_s, memory_mb=memory_mb
+    )

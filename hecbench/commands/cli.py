@@ -8,6 +8,7 @@ import is imported by the verb that uses it.
 from __future__ import annotations
 
 import os
+import signal
 import sys
 from importlib import metadata
 from pathlib import Path
@@ -16,6 +17,7 @@ import click
 
 from hecbench import __version__
 from hecbench.commands import choices, console
+from hecbench.commands.calibrate import calibrate
 from hecbench.commands.run import demo, run
 from hecbench.commands.solve import solve
 from hecbench.errors import HecbenchError, InputError
@@ -39,6 +41,7 @@ class _Verbs(click.Group):
 
 def main() -> None:
     """Run the command line; errors become one line and an exit code, never a traceback."""
+    signal.signal(signal.SIGTERM, _interrupt)
     try:
         code = cli.main(standalone_mode=False)
     except click.ClickException as error:
@@ -50,10 +53,17 @@ def main() -> None:
     except (click.Abort, KeyboardInterrupt):
         click.echo("hecbench: interrupted; results written so far are kept", err=True)
         code = 130
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except OSError as error:
+        if isinstance(error, BrokenPipeError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        else:  # a full disk, a folder that may not be written
+            click.echo(f"hecbench: {error.filename or 'the output'}: {error.strerror or error}", err=True)
         code = 1
     sys.exit(code)
+
+
+def _interrupt(number: int, frame: object) -> None:
+    raise KeyboardInterrupt
 
 
 @click.group(cls=_Verbs, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -62,7 +72,7 @@ def cli() -> None:
     """Calibrate hand-eye rigs with every method, measure all by the same rulers, and report."""
 
 
-for _verb in (demo, run, solve):
+for _verb in (calibrate, demo, run, solve):
     cli.add_command(_verb)
 
 
@@ -214,7 +224,7 @@ def import_recording(source: Path, destination: Path, format_name: str | None, u
 
 
 @cli.command()
-@click.argument("estimate", type=choices.FILE)
+@click.argument("estimate", type=choices.ANY_PATH)
 @click.option("--to", "format_name", required=True, metavar="F", help="An exporter of `hecbench plugins`.")
 @click.option("--out", type=choices.FILE, help="Write to this file instead of stdout.")
 @click.option("--parent", help="Name of the parent frame; default: the estimate's.")
@@ -226,14 +236,14 @@ def import_recording(source: Path, destination: Path, format_name: str | None, u
 @click.option("--other-link", help="The robot's other end, where a format names both.")
 @click.option("--marker", help="Name of the target's frame, where a format names it.")
 def export(estimate: Path, format_name: str, out: Path | None, **options: str | None) -> None:
-    """Write an ESTIMATE in another program's format."""
-    from hecbench import estimate as estimates
+    """Write an ESTIMATE in another program's format: a file, or the recommended one of a folder of results."""
     from hecbench import files, registry
+    from hecbench.report import recommended
     from hecbench.specs import ExporterSpec, Kind
 
     exporter = registry.load().get(Kind.EXPORTER, format_name, ExporterSpec)
     given = {name: value for name, value in options.items() if value is not None}
-    text = exporter.write(estimates.load(estimate), given)
+    text = exporter.write(recommended.of(estimate), given)
     if out is None:
         click.echo(text, nl=not text.endswith("\n"))
     else:

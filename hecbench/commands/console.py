@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from hecbench.estimate import Estimate
     from hecbench.report.tables import Table
     from hecbench.specs import SolverSpec
+    from hecbench.verdict import Verdict
 
 _PIPE_WIDTH = 200
 
@@ -44,9 +45,9 @@ def print_table(table: Table) -> None:
     from rich.text import Text
 
     console = Console(width=None if sys.stdout.isatty() else _PIPE_WIDTH)
-    shown = RichTable(title=table.title, title_justify="left", header_style="bold")
+    shown = RichTable(title=Text(table.title), title_justify="left", header_style="bold")
     for number, name in enumerate(table.header):
-        shown.add_column(name, justify="left" if number < table.left else "right", overflow="fold")
+        shown.add_column(Text(name), justify="left" if number < table.left else "right", overflow="fold")
     for row in table.rows:
         shown.add_row(*map(Text, row))
     console.print(shown)
@@ -65,11 +66,55 @@ def print_answer(estimate: Estimate, do_not_use: bool = False) -> None:
         return
     translation = ", ".join(f"{value:.5f}" for value in estimate.parent_T_camera[:3, 3])
     quaternion = ", ".join(f"{value:.6f}" for value in se3.to_quat_xyzw(estimate.parent_T_camera))
+    rpy = ", ".join(f"{value:.6f}" for value in se3.to_rpy(estimate.parent_T_camera[:3, :3]))
     matrix = np.array2string(estimate.parent_T_camera, precision=6, suppress_small=True, prefix="  ")
     mark = "DO NOT USE " if do_not_use else ""
     click.echo(f"{mark}{estimate.parent_link}_T_camera by {estimate.solver}:")
-    click.echo(f"  translation m: [{translation}]   quaternion x y z w: [{quaternion}]")
+    click.echo(
+        f"  translation m: [{translation}]   quaternion x y z w: [{quaternion}]   roll pitch yaw rad: [{rpy}]"
+    )
     click.echo(f"  {matrix}")
+
+
+def print_verdict(verdict: Verdict) -> None:
+    """The answer, what to expect of it, why, and what to do next."""
+    best = verdict.recommended
+    click.echo(f"{verdict.recording}: {verdict.grade.words.upper()} ({verdict.rule})")
+    if best is not None and best.parent_T_camera is not None:
+        click.echo()
+        print_answer(best, do_not_use=verdict.grade == "do_not_use")
+        for line in camera_lines(best):
+            click.echo(f"  {line}")
+    if verdict.expected is not None:
+        click.echo(f"\nExpected error in the workspace: {verdict.expected} (95 %)")
+    if verdict.at is not None:
+        click.echo(f"Expected error at that place: {verdict.at} (95 %)")
+    _print_list("Why", verdict.reasons)
+    _print_list(
+        "Agree", [f"{a.solver} ({a.evidence}) within {a.distance_mm:.2g} mm" for a in verdict.agreement]
+    )
+    _print_list("Disagree", [f"{r.solver} by {r.distance_mm:.2g} mm: {r.reason}" for r in verdict.rivals])
+    _print_list("Next", verdict.next)
+
+
+def camera_lines(estimate: Estimate) -> list[str]:
+    """The camera that belongs to an answer, where the method changed it."""
+    camera = estimate.camera
+    if camera is None or camera.K is None or not estimate.diagnostics.get("camera_changed"):
+        return []
+    (fx, _, cx), (_, fy, cy) = camera.K[:2]
+    lens = ", ".join(f"{value:.5g}" for value in camera.distortion)
+    return [
+        "this pose belongs to a camera of its own, not to the recording's:",
+        f"fx {fx:.3f}, fy {fy:.3f}, cx {cx:.3f}, cy {cy:.3f} px; distortion [{lens}]",
+    ]
+
+
+def _print_list(title: str, sentences: Sequence[str]) -> None:
+    if sentences:
+        click.echo(f"\n{title}:")
+    for sentence in sentences:
+        click.echo(f"  - {sentence}")
 
 
 def print_critical(findings: Iterable[Mapping[str, Any]], of: str) -> bool:
@@ -98,7 +143,7 @@ class Progress:
         console = Console(stderr=True)
         columns = (
             SpinnerColumn(),
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", markup=False),
             BarColumn(),
             TimeElapsedColumn(),
             TextColumn("left"),
@@ -127,13 +172,17 @@ class Progress:
         if spec.slow and not self._shown:
             say(f"{spec.name} is at work; it may take minutes")
 
+    def writing(self) -> None:
+        """All methods have ended."""
+        self._bar.update(self._task, description="writing")
+
     def done(self, estimate: Estimate) -> None:
         """The method at work has ended."""
         if self._at_work is not None:
             self._bar.advance(self._task, self._weight(self._at_work))
         if self._shown:
             self._bar.console.print(
-                f"{estimate.solver}: {estimate.status}, {estimate.seconds:.2g} s", style="dim"
+                f"{estimate.solver}: {estimate.status}, {estimate.seconds:.2g} s", style="dim", markup=False
             )
 
 

@@ -12,7 +12,8 @@ from hecbench import __version__, registry
 from hecbench.registry import PluginStatus
 
 _EXTRAS = {
-    "torch": ("torch", "pytorch_kinematics"),
+    "torch": ("torch", "pytorch_kinematics", "safetensors", "onnx"),
+    "sam": ("onnxruntime",),
     "ur": ("rtde_control",),
     "lab": ("mujoco",),
     "cameras": ("pypylon",),

@@ -32,10 +32,15 @@ def demo(out: Path, samples: int, seed: int) -> None:
     from hecbench.running import planning
     from hecbench.storage import store
 
-    (out / store.FILE_NAME).unlink(missing_ok=True)
     levels = ("tag_2m", "small_tag_2m", "board_2m")
     tasks = planning.suite_tasks("markers", levels, samples, (), seed)
-    contents = _run(tasks, out, choices.run_options(seed), jobs=os.cpu_count() or 1)
+    if (out / store.FILE_NAME).exists():
+        strange = next(
+            (e for e in store.read(out).estimates if (e.suite, e.level in levels) != ("markers", True)), None
+        )
+        if strange is not None:
+            raise InputError(f"{out}: holds results of another run ({strange.recording}); give another --out")
+    contents = _run(tasks, out, choices.run_options(seed), jobs=os.cpu_count() or 1, resume=True)
     console.print_tables(contents.estimates)
     click.echo(f"report: {html.write(out).path}")
 
@@ -51,6 +56,7 @@ def demo(out: Path, samples: int, seed: int) -> None:
 @choices.held_out
 @choices.check
 @choices.timeout
+@choices.memory
 @click.option("--out", type=choices.FOLDER, help="Default: out/<first source's name>.")
 @click.option("--jobs", type=int, default=1, show_default=True, help="Worker processes; -1: one per core.")
 @click.option("--executor", metavar="URL", help="A dask scheduler, tcp://host:port, instead of --jobs.")
@@ -67,6 +73,7 @@ def run(
     held_out: bool | None,
     check: bool,
     timeout_s: float | None,
+    memory_mb: int | None,
     out: Path | None,
     jobs: int,
     executor: str | None,
@@ -81,7 +88,7 @@ def run(
         raise InputError("--jobs 0: give a number of processes, or -1 for one per core")
     tasks = planning.tasks(sources, solvers, levels, samples, seed, segmenter)
     out = out or Path("out") / Path(sources[0]).name
-    options = choices.run_options(seed, held_out, segmenter, timeout_s)
+    options = choices.run_options(seed, held_out, segmenter, timeout_s, memory_mb)
     contents = _run(tasks, out, options, jobs=jobs, executor=executor, resume=resume)
     for sentence in contents.damage:
         console.say(sentence)

@@ -33,6 +33,10 @@ OPTIONS = {
 }
 """What `options` may hold; the command line offers each as --name."""
 
+CAMERA_CHANGED = (
+    "WARNING: the method changed the camera: use this pose with this camera, not with the recording's"
+)
+
 _OPTICAL = "camera_optical_frame"
 _REP_103 = se3.make([[0, 0, 1], [-1, 0, 0], [0, -1, 0]], [0, 0, 0])
 """link_T_optical: the link looks along x with z up, the optical frame along z with y down."""
@@ -41,12 +45,12 @@ _FRAME_NAME = re.compile(r"[A-Za-z_][\w/.\-]*")
 
 @dataclass(frozen=True, eq=False)
 class Placement:
-    """Where the child frame goes: parent_T_child (4, 4) m, and how it came about, for a comment."""
+    """Where the child frame goes: parent_T_child (4, 4) m, and what is to be known of it, sentences for comments."""
 
     parent: str
     child: str
     parent_T_child: Array
-    comment: str
+    comments: tuple[str, ...]
 
     @property
     def xyz(self) -> list[float]:
@@ -61,7 +65,7 @@ class Placement:
     @property
     def rpy(self) -> list[float]:
         """Roll, pitch, yaw (rad) about the fixed axes x, y, z, as in URDF."""
-        return _rounded(_fixed_xyz(self.parent_T_child[:3, :3]))
+        return _rounded(se3.to_rpy(self.parent_T_child[:3, :3]))
 
 
 def placement(estimate: Estimate, options: Mapping[str, str]) -> Placement:
@@ -84,8 +88,10 @@ def placement(estimate: Estimate, options: Mapping[str, str]) -> Placement:
     if parent == child:
         raise InputError(f"export: '{parent}' cannot be its own child; name another --child")
     origin = re.sub(r"[^\w .:/+-]+|-{2,}", "_", f"{estimate.solver} on {estimate.recording}")
+    camera = _camera_comments(estimate)
     if child == optical:
-        return Placement(parent, child, estimate.parent_T_camera, f"{origin}, the camera's optical frame")
+        first = f"{origin}, the camera's optical frame"
+        return Placement(parent, child, estimate.parent_T_camera, (first, *camera))
     given = options.get("child_T_optical")
     child_T_optical = _REP_103 if given is None else _transform(given)
     how = "as given" if given else f"by REP 103 without offset: compare `tf2_echo {child} {optical}`"
@@ -93,8 +99,22 @@ def placement(estimate: Estimate, options: Mapping[str, str]) -> Placement:
         parent,
         child,
         estimate.parent_T_camera @ se3.inverse(child_T_optical),
-        f"{origin}; {child} to {optical} {how}",
+        (f"{origin}; {child} to {optical} {how}", *camera),
     )
+
+
+def _camera_comments(estimate: Estimate) -> tuple[str, ...]:
+    """The camera that belongs to the pose, and a warning where it is not the recording's."""
+    camera = estimate.camera
+    if camera is None or camera.K is None:
+        return ()
+    (fx, _, cx), (_, fy, cy) = camera.K[:2]
+    lens = " ".join(map(_text, camera.distortion)) or "none"
+    said = (
+        f"camera: fx {_text(fx)} fy {_text(fy)} cx {_text(cx)} cy {_text(cy)}, {camera.width}x{camera.height} px, "
+        f"distortion ({camera.distortion_model}) {lens}"
+    )
+    return (said, CAMERA_CHANGED) if estimate.diagnostics.get("camera_changed") else (said,)
 
 
 def ros_static_transform(estimate: Estimate, options: Mapping[str, str]) -> str:
@@ -103,7 +123,7 @@ def ros_static_transform(estimate: Estimate, options: Mapping[str, str]) -> str:
     x, y, z = map(_text, at.xyz)
     qx, qy, qz, qw = map(_text, at.quat_xyzw)
     return (
-        f"# {at.comment}\n"
+        f"{_lines('# ', at)}"
         f"ros2 run tf2_ros static_transform_publisher --x {x} --y {y} --z {z} "
         f"--qx {qx} --qy {qy} --qz {qz} --qw {qw} --frame-id {at.parent} --child-frame-id {at.child}\n"
         f"# ROS 1: rosrun tf2_ros static_transform_publisher {x} {y} {z} {qx} {qy} {qz} {qw} "
@@ -115,7 +135,7 @@ def urdf_joint(estimate: Estimate, options: Mapping[str, str]) -> str:
     """A fixed joint for a URDF; the child link is the camera's own or must be declared once."""
     at = placement(estimate, options)
     return (
-        f"<!-- {at.comment} -->\n"
+        f"{_lines('<!-- ', at, ' -->')}"
         f'<joint name="{at.parent}_to_{at.child}" type="fixed">\n'
         f'  <parent link="{at.parent}"/>\n'
         f'  <child link="{at.child}"/>\n'
@@ -133,13 +153,15 @@ def json_transform(estimate: Estimate, options: Mapping[str, str]) -> str:
     content = {
         "parent": at.parent,
         "child": at.child,
-        "comment": at.comment,
+        "comment": at.comments[0],
         "matrix": at.parent_T_child,
         "translation_m": at.xyz,
         "quaternion_xyzw": at.quat_xyzw,
         "rotvec_rad": _rounded(se3.so3_log(at.parent_T_child[:3, :3])),
         "rpy_rad": at.rpy,
         "covariance_parent_rad_m": estimate.covariance,
+        "camera": estimate.to_json()["camera"],
+        "warnings": [comment for comment in at.comments if comment == CAMERA_CHANGED],
     }
     return msgspec.json.format(msgspec.json.encode(plain(content)), indent=2).decode() + "\n"
 
@@ -162,7 +184,11 @@ def easy_handeye(estimate: Estimate, options: Mapping[str, str]) -> str:
         "tracking_base_frame": at.child,
         "tracking_marker_frame": _frame(options.get("marker") or "target"),
     }
-    lines = [f"# {at.comment}", "parameters:", *(f"  {key}: {value}" for key, value in parameters.items())]
+    lines = [
+        *(f"# {comment}" for comment in at.comments),
+        "parameters:",
+        *(f"  {key}: {value}" for key, value in parameters.items()),
+    ]
     return "\n".join([*lines, "transformation:", *(f"  {k}: {_text(v)}" for k, v in names.items())]) + "\n"
 
 
@@ -172,7 +198,7 @@ def moveit_launch(estimate: Estimate, options: Mapping[str, str]) -> str:
     numbers = " ".join(map(_text, [*at.xyz, *at.quat_xyzw]))
     return (
         "<launch>\n"
-        f"  <!-- {at.comment} -->\n"
+        f"{_lines('  <!-- ', at, ' -->')}"
         '  <node pkg="tf2_ros" type="static_transform_publisher" name="camera_link_broadcaster"\n'
         f'        args="{numbers} {at.parent} {at.child}"/>\n'
         "</launch>\n"
@@ -186,7 +212,7 @@ def moveit_launch_ros2(estimate: Estimate, options: Mapping[str, str]) -> str:
     arguments = [part for key, value in values.items() for part in (f"--{key}", _text(value))]
     arguments += ["--frame-id", at.parent, "--child-frame-id", at.child]
     return (
-        f'"""Static transform: {at.comment}."""\n\n'
+        f"{_lines('# ', at)}\n"
         "from launch import LaunchDescription\n"
         "from launch_ros.actions import Node\n\n\n"
         "def generate_launch_description():\n"
@@ -194,6 +220,11 @@ def moveit_launch_ros2(estimate: Estimate, options: Mapping[str, str]) -> str:
         '    node = Node(package="tf2_ros", executable="static_transform_publisher", arguments=arguments)\n'
         "    return LaunchDescription([node])\n"
     )
+
+
+def _lines(before: str, at: Placement, after: str = "") -> str:
+    """A comment line for each comment."""
+    return "".join(f"{before}{comment}{after}\n" for comment in at.comments)
 
 
 def _frame(name: str) -> str:
@@ -214,17 +245,6 @@ def _transform(text: str) -> Array:
             f"export: child_T_optical '{text}' is not 'x y z qx qy qz qw' with a unit quaternion"
         )
     return se3.from_quat_xyzw(numbers[3:], numbers[:3])
-
-
-def _fixed_xyz(rotation: Array) -> Array:
-    """Roll, pitch, yaw; at a pitch of 90 degrees, where only their sum is known, yaw is zero."""
-    from scipy.spatial.transform import Rotation
-
-    pitch = np.arctan2(-rotation[2, 0], np.hypot(rotation[0, 0], rotation[1, 0]))
-    if abs(rotation[2, 0]) > 1 - 1e-12:
-        roll = np.arctan2(np.sign(pitch) * rotation[0, 1], np.sign(pitch) * rotation[0, 2])
-        return np.array([roll, pitch, 0.0])
-    return np.asarray(Rotation.from_matrix(rotation).as_euler("xyz"))
 
 
 def _rounded(values: Array) -> list[float]:

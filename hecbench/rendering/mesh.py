@@ -114,14 +114,26 @@ class _Welded:
 
 
 def _weld(parts: Sequence[Part], cell_m: float) -> _Welded:
-    """One link's parts with the vertices of each cell merged into the one nearest to their mean."""
+    """One link's parts with the vertices of each cell merged into the one nearest to their mean.
+
+    The back of a surface that does not close has vertices of its own, so that its rim stays an open edge.
+    """
     if not parts:
         return _Welded(np.zeros((0, 3)), np.zeros((0, 3), int), np.zeros(0, int), 0.0)
     vertices = np.concatenate([part.vertices for part in parts])
     first = np.cumsum([0, *(len(part.vertices) for part in parts)])
     faces = np.concatenate([part.faces + start for part, start in zip(parts, first, strict=False)])
     part = np.repeat(np.arange(len(parts)), [len(part.faces) for part in parts])
-    _, cell = np.unique(np.round(vertices / cell_m).astype(np.int64), axis=0, return_inverse=True)
+    side = np.zeros(len(vertices), np.int64)
+    both = np.concatenate(
+        [p.both_sides if len(p.both_sides) else np.zeros(len(p.faces), bool) for p in parts]
+    )
+    if both.any():
+        faces = np.concatenate([faces, faces[both][:, ::-1] + len(vertices)])
+        vertices, part = np.concatenate([vertices, vertices]), np.concatenate([part, part[both]])
+        side = np.repeat([0, 1], len(side))
+    cells = np.c_[np.round(vertices / cell_m).astype(np.int64), side]
+    _, cell = np.unique(cells, axis=0, return_inverse=True)
     cell = cell.reshape(-1)
     count = np.bincount(cell)
     centre = np.stack([np.bincount(cell, vertices[:, axis]) / count for axis in range(3)], -1)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hecbench import files
+from hecbench import files, verdict
 from hecbench.errors import InputError
 from hecbench.estimate import Estimate, best_first
 from hecbench.report.figures import figures
@@ -17,8 +17,9 @@ from hecbench.report.studies import is_study
 from hecbench.report.studies import sections as sections_of_studies
 from hecbench.report.tables import Group, groups, table
 from hecbench.report.trials import sections as sections_of_trials
-from hecbench.storage import evidence, store, trial_record
+from hecbench.storage import evidence, results, store, trial_record
 from hecbench.storage.evidence import Evidence
+from hecbench.storage.results import VERDICT_NAME
 from hecbench.storage.trial_record import TrialRecord
 
 FILE_NAME = "report.html"
@@ -42,8 +43,12 @@ def write(folder: Path) -> Written:
     """
     has_trials = (folder / trial_record.FILE_NAME).is_file()
     trials = trial_record.read(folder) if has_trials else trial_record.Contents([], [], [])
-    alone = has_trials and not (folder / store.FILE_NAME).is_file()
-    contents = store.Contents([], []) if alone else store.read(folder)
+    judged = verdict.load(folder / VERDICT_NAME) if (folder / VERDICT_NAME).is_file() else None
+    alone = has_trials and judged is None and not (folder / store.FILE_NAME).is_file()
+    if judged is not None:
+        contents = store.Contents(list(judged.estimates), [])
+    else:
+        contents = store.Contents([], []) if alone else results.read(folder)
     if not contents.estimates and not alone:
         raise InputError(f"{folder}: its store holds no whole result; run again with `hecbench run --resume`")
     damage = [*contents.damage, *trials.damage]

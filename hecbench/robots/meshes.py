@@ -10,7 +10,8 @@ import hashlib
 import os
 import tempfile
 import zipfile
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +19,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import cache
-from hecbench.errors import InputError
-from hecbench.robots.urdf_files import find_mesh
+from hecbench.robots import materials, mesh_files
+from hecbench.robots.materials import referenced_files
+from hecbench.robots.sheets import seen_from_behind
+from hecbench.robots.urdf import Mesh, Primitive, Visual
+from hecbench.robots.urdf_files import find_mesh, find_texture
 
-_CACHE_VERSION = 1
+_CACHE_VERSION = 4
 _GREY = (0.7, 0.7, 0.7)
+_SAME_M = 1e-6
+"""Vertices this close are one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,142 +43,142 @@ class Part:
     """(V, 3) m in the link frame."""
     faces: NDArray[np.int32] = field(repr=False)
     """(F, 3), counter-clockwise seen from outside."""
+    both_sides: NDArray[np.bool_] = field(repr=False, default_factory=lambda: np.zeros(0, bool))
+    """(F,) whose back is seen as well, as in surfaces that do not close; empty: none."""
 
 
-def visual_parts(robot: Any, urdf: Path) -> tuple[Part, ...]:
-    """All visual parts of a yourdfpy robot, from the cache when nothing changed.
+def visual_parts(visuals: Sequence[Visual], urdf: Path) -> tuple[tuple[Part, ...], tuple[str, ...]]:
+    """All visual parts and the notes on them, from the cache when nothing changed.
+
+    The colours of a mesh file stand where it has at least two different ones, or where the URDF gives none;
+    else the URDF's colour counts, which often is a placeholder for a whole link.
 
     Raises:
         InputError: a mesh file is missing, unreadable or without faces; the message names it.
     """
-    files = {
-        visual.geometry.mesh.filename: find_mesh(visual.geometry.mesh.filename, urdf)
-        for link in robot.links
-        for visual in link.visuals
-        if visual.geometry.mesh is not None
+    found = {
+        visual.shape.filename: find_mesh(visual.shape.filename, urdf)
+        for visual in visuals
+        if isinstance(visual.shape, Mesh)
     }
-    entry = cache.folder() / f"robot-{_digest(urdf, files)}.npz"
-    parts = _read(entry)
-    if parts is None:
-        parts = tuple(
-            part
-            for link in robot.links
-            for visual in link.visuals
-            for part in _visual_parts(link.name, visual, files, _named_colours(robot))
-        )
-        _write(entry, parts)
-    return parts
+    textures = {visual.texture: find_texture(visual.texture, urdf) for visual in visuals if visual.texture}
+    entry = cache.folder() / f"robot-{_digest(urdf, {*found.values(), *filter(None, textures.values())})}.npz"
+    if (cached := _read(entry)) is not None:
+        return cached
+    notes: list[str] = []
+    pieces = [_pieces(visual, found, textures, notes) for visual in visuals]
+    parts = _seen_from_both_sides(tuple(part for visual in pieces for part in visual))
+    _write(entry, parts, notes := list(dict.fromkeys(notes)))
+    return parts, tuple(notes)
 
 
-def _named_colours(robot: Any) -> dict[str, Any]:
-    return {material.name: material.color for material in robot.materials if material.color is not None}
-
-
-def _visual_parts(link: str, visual: Any, files: dict[str, Path], named: dict[str, Any]) -> list[Part]:
-    import trimesh
-
-    geometry = visual.geometry
+def _pieces(
+    visual: Visual, found: dict[str, Path], textures: dict[str, Path | None], notes: list[str]
+) -> list[Part]:
     scale = np.ones(3)
-    if geometry.mesh is not None:
-        meshes = _mesh_file(files[geometry.mesh.filename])
-        if geometry.mesh.scale is not None:
-            scale = np.broadcast_to(np.asarray(geometry.mesh.scale, float), 3)
-    elif geometry.box is not None:
-        meshes = {"box": trimesh.creation.box(geometry.box.size)}
-    elif geometry.cylinder is not None:
-        shape = geometry.cylinder
-        meshes = {"cylinder": trimesh.creation.cylinder(shape.radius, shape.length, sections=64)}
+    if isinstance(visual.shape, Mesh):
+        pieces, said = mesh_files.read(found[visual.shape.filename])
+        notes += said
+        scale = visual.shape.scale
     else:
-        meshes = {"sphere": trimesh.creation.icosphere(4, geometry.sphere.radius)}
-    urdf_colour = _urdf_colour(visual.material, named)
-    origin = np.eye(4) if visual.origin is None else np.asarray(visual.origin, float)
+        pieces = [_primitive(visual.shape)]
+    colour = visual.colour
+    if visual.texture is not None:
+        picture = textures[visual.texture]
+        mean = (
+            None
+            if picture is None
+            else materials.textured(picture, None, pieces[0].faces, pieces[0].vertices)[0]
+        )
+        if mean is None:
+            notes.append(
+                f"link '{visual.link}': its texture {visual.texture} cannot be read: no colour of it"
+            )
+        colour = mean or colour
+    own = len({piece.colour for piece in pieces if piece.colour is not None}) > 1
     parts = []
-    for name, mesh in meshes.items():
-        faces = np.asarray(mesh.faces, np.int32)
-        if np.prod(scale) < 0:
-            faces = faces[:, ::-1]
-        vertices = (np.asarray(mesh.vertices, float) * scale) @ origin[:3, :3].T + origin[:3, 3]
-        parts.append(Part(f"{link}/{name}", link, urdf_colour or _mesh_colour(mesh), vertices, faces))
+    for piece in pieces:
+        faces = piece.faces[:, ::-1] if np.prod(scale) < 0 else piece.faces
+        vertices = (piece.vertices * scale) @ visual.origin[:3, :3].T + visual.origin[:3, 3]
+        chosen = (piece.colour if own else None) or colour or piece.colour or _GREY
+        name = f"{visual.link}/{piece.name}"
+        parts.append(Part(name, visual.link, chosen, vertices, np.ascontiguousarray(faces, np.int32)))
     return parts
 
 
-def _mesh_file(path: Path) -> dict[str, Any]:
-    """Meshes by material name of one file, placed as the file's own scene places them."""
+def _primitive(shape: Primitive) -> mesh_files.Piece:
     import trimesh
 
-    try:
-        scene = trimesh.load_scene(str(path), process=False)
-        meshes: dict[str, Any] = {}
-        for node in scene.graph.nodes_geometry:
-            transform, name = scene.graph[node]
-            mesh = scene.geometry[name].copy()
-            mesh.apply_transform(transform)
-            material = getattr(getattr(mesh.visual, "material", None), "name", None)
-            label = str(material or path.stem)
-            meshes[label if label not in meshes else f"{label}.{len(meshes)}"] = mesh
-    except Exception as error:  # each format's parser raises its own errors
-        raise InputError(
-            f"{path}: not a readable mesh: {(str(error) or type(error).__name__).splitlines()[0]}"
-        ) from error
-    meshes = {name: mesh for name, mesh in meshes.items() if len(getattr(mesh, "faces", ()))}
-    if not meshes:
-        raise InputError(f"{path}: the mesh has no faces: export it as triangles")
-    if not all(np.isfinite(mesh.vertices).all() for mesh in meshes.values()):
-        raise InputError(f"{path}: the mesh has vertices that are not finite")
-    return meshes
+    if shape.kind == "box":
+        mesh = trimesh.creation.box(shape.sizes)
+    elif shape.kind == "cylinder":
+        mesh = trimesh.creation.cylinder(*shape.sizes, sections=64)
+    else:
+        mesh = trimesh.creation.icosphere(4, *shape.sizes)
+    return mesh_files.Piece(
+        shape.kind, np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int64), None
+    )
 
 
-def _urdf_colour(material: Any, named: dict[str, Any]) -> tuple[float, float, float] | None:
-    if material is None:
-        return None
-    colour = material.color if material.color is not None else named.get(material.name)
-    return None if colour is None else _rgb(np.asarray(colour.rgba, float))
+def _seen_from_both_sides(parts: tuple[Part, ...]) -> tuple[Part, ...]:
+    """The parts with the faces marked whose backs are seen, judged over all parts of a link together."""
+    marked = list(parts)
+    for link in dict.fromkeys(part.link for part in parts):
+        of_link = [i for i, part in enumerate(parts) if part.link == link]
+        first = np.cumsum([0, *(len(parts[i].vertices) for i in of_link)])
+        vertices = np.concatenate([parts[i].vertices for i in of_link])
+        faces = np.concatenate([parts[i].faces + start for i, start in zip(of_link, first, strict=False)])
+        _, place, merged = np.unique(
+            np.round(vertices / _SAME_M).astype(np.int64), axis=0, return_index=True, return_inverse=True
+        )
+        behind = seen_from_behind(vertices[place], merged.reshape(-1)[faces])
+        ends = np.cumsum([len(parts[i].faces) for i in of_link])[:-1]
+        for i, both in zip(of_link, np.split(behind, ends), strict=True):
+            marked[i] = replace(parts[i], both_sides=both)
+    return tuple(marked)
 
 
-def _mesh_colour(mesh: Any) -> tuple[float, float, float]:
-    material = getattr(mesh.visual, "material", None)
-    if material is not None:
-        return _rgb(np.asarray(material.main_color, float) / 255)
-    if getattr(mesh.visual, "kind", None) in ("face", "vertex"):
-        return _rgb(np.asarray(mesh.visual.face_colors, float).mean(0) / 255)
-    return _GREY
-
-
-def _rgb(rgba: NDArray[np.float64]) -> tuple[float, float, float]:
-    red, green, blue = (float(value) for value in rgba[:3])
-    return red, green, blue
-
-
-def _digest(urdf: Path, files: dict[str, Path]) -> str:
-    """A hash of the URDF, of every mesh and of the material files beside them."""
-    materials = {path.with_suffix(".mtl") for path in files.values()}
+def _digest(urdf: Path, used: Iterable[Path]) -> str:
+    """A hash of the URDF, of every mesh and texture, and of the material files and textures that these name."""
+    named = (
+        other for path in used if path.suffix.lower() in (".obj", ".dae") for other in referenced_files(path)
+    )
     digest = hashlib.sha256(f"{_CACHE_VERSION}".encode())
-    for path in [urdf, *sorted({*files.values(), *(path for path in materials if path.is_file())})]:
+    for path in [urdf, *sorted({*used, *named})]:
         digest.update(hashlib.sha256(path.read_bytes()).digest())
     return digest.hexdigest()[:32]
 
 
-def _read(entry: Path) -> tuple[Part, ...] | None:
+def _read(entry: Path) -> tuple[tuple[Part, ...], tuple[str, ...]] | None:
     try:
         with np.load(entry, allow_pickle=False) as data:
             columns = zip(data["names"], data["links"], data["colours"], strict=True)
-            return tuple(
-                Part(str(name), str(link), _rgb(colour), data[f"vertices{i}"], data[f"faces{i}"])
-                for i, (name, link, colour) in enumerate(columns)
+            parts = tuple(
+                Part(
+                    str(name),
+                    str(link),
+                    (float(rgb[0]), float(rgb[1]), float(rgb[2])),
+                    data[f"vertices{i}"],
+                    data[f"faces{i}"],
+                    data[f"both_sides{i}"],
+                )
+                for i, (name, link, rgb) in enumerate(columns)
             )
+            return parts, tuple(str(note) for note in data["notes"])
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return None
 
 
-def _write(entry: Path, parts: tuple[Part, ...]) -> None:
+def _write(entry: Path, parts: tuple[Part, ...], notes: list[str]) -> None:
     """Write aside, then rename; a folder that cannot be written only costs the next start its time."""
     arrays: dict[str, Any] = {
         "names": np.array([part.name for part in parts]),
         "links": np.array([part.link for part in parts]),
         "colours": np.array([part.colour for part in parts], float).reshape(-1, 3),
+        "notes": np.array(notes, str),
     }
     for i, part in enumerate(parts):
-        arrays |= {f"vertices{i}": part.vertices, f"faces{i}": part.faces}
+        arrays |= {f"vertices{i}": part.vertices, f"faces{i}": part.faces, f"both_sides{i}": part.both_sides}
     try:
         entry.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile(dir=entry.parent, suffix=".npz", delete=False) as aside:

@@ -8,18 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
-from enum import StrEnum
 from fnmatch import fnmatchcase
 from functools import cached_property
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hecbench import se3
 from hecbench.errors import InputError
+from hecbench.robots import urdf
+from hecbench.robots.joints import Joint, Motion
 from hecbench.robots.meshes import Part, visual_parts
 
 Array = NDArray[np.float64]
@@ -27,102 +27,81 @@ Array = NDArray[np.float64]
 KNOWN_ARMS = ("ur3e", "ur5e")
 GRIPPER = "robotiq_2f_85"
 _NOT_ON_EVERY_ROBOT = ("base_link_inertia/cable*", "base_link_inertia/M_Text*")
-_LIMIT_TOLERANCE = 1e-6
-
-
-class Motion(StrEnum):
-    """What a joint does with its position."""
-
-    FIXED = "fixed"
-    REVOLUTE = "revolute"
-    PRISMATIC = "prismatic"
-
-
-_MOTIONS = {
-    "fixed": Motion.FIXED,
-    "revolute": Motion.REVOLUTE,
-    "continuous": Motion.REVOLUTE,
-    "prismatic": Motion.PRISMATIC,
-}
-
-
-@dataclass(frozen=True, eq=False)
-class Joint:
-    """One URDF joint. A mimic joint moves with `leader`: ``position = multiplier * leader + offset``."""
-
-    name: str
-    motion: Motion
-    parent: str
-    child: str
-    origin: Array
-    """parent_T_joint (4, 4) at position zero."""
-    axis: Array
-    """Unit axis (3,) in the joint frame."""
-    lower: float = -np.inf
-    upper: float = np.inf
-    leader: str | None = None
-    multiplier: float = 1.0
-    offset: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class RobotModel:
-    """A tree of links. `joints` are ordered parents first; `parts` are the visual meshes, one colour each."""
+    """A tree of links. `joints` are ordered parents first; `parts` are the visual meshes, one colour each.
+
+    `notes` say what its user should know: what was left out, and what looks like a fault of the URDF.
+    """
 
     name: str
     joints: tuple[Joint, ...]
     links: tuple[str, ...]
     parts: tuple[Part, ...] = field(default=(), repr=False)
+    notes: tuple[str, ...] = ()
 
     @cached_property
     def joint_names(self) -> tuple[str, ...]:
-        """The joints that a position can be given for."""
+        """The joints that move on their own. Positions may be given for mimic joints as well."""
         return tuple(j.name for j in self.joints if j.motion is not Motion.FIXED and j.leader is None)
 
     def limits(self, joint_names: Sequence[str] | None = None) -> Array:
         """Lower and upper limits (J, 2), rad or m, of the named joints."""
-        by_name = {joint.name: joint for joint in self.joints}
-        names = self.joint_names if joint_names is None else joint_names
-        self._check_names(names)
-        return np.array([[by_name[name].lower, by_name[name].upper] for name in names]).reshape(-1, 2)
+        joints = self._named(self.joint_names if joint_names is None else joint_names)
+        return np.array([[joint.lower, joint.upper] for joint in joints]).reshape(-1, 2)
 
     def check(self, positions: ArrayLike, joint_names: Sequence[str] | None = None) -> Array:
-        """The positions (..., J) as an array; an `InputError` for wrong length, non-finite or off limits."""
-        names = self.joint_names if joint_names is None else tuple(joint_names)
-        limits = self.limits(names)
+        """The positions (..., J) as an array; an `InputError` for wrong length, non-finite or off limits.
+
+        A position that is a hair beyond its limit (`Joint.hair`) is taken as it is.
+        """
+        joints = self._named(self.joint_names if joint_names is None else joint_names)
         values = np.asarray(positions, float)
-        if values.ndim == 0 or values.shape[-1] != len(names):
+        if values.ndim == 0 or values.shape[-1] != len(joints):
             given = values.shape[-1] if values.ndim else 0
-            raise InputError(
-                f"{self.name}: {given} joint positions given, {len(names)} needed: {', '.join(names)}"
-            )
+            needed = ", ".join(joint.name for joint in joints)
+            raise InputError(f"{self.name}: {given} joint positions given, {len(joints)} needed: {needed}")
         if not np.isfinite(values).all():
             raise InputError(f"{self.name}: joint positions must be finite")
-        outside = (values < limits[:, 0] - _LIMIT_TOLERANCE) | (values > limits[:, 1] + _LIMIT_TOLERANCE)
-        if outside.any():
-            where = tuple(np.argwhere(outside)[0])
-            lower, upper = limits[where[-1]]
-            raise InputError(
-                f"{self.name}: {names[where[-1]]} at {values[where]:.4g} is outside its limits"
-                f" {lower:.4g} to {upper:.4g}: degrees instead of radians, or another joint order?"
-            )
+        for column, joint in enumerate(joints):
+            if (refused := joint.refuses(values[..., column])).any():
+                raise InputError(f"{self.name}: {joint.reason(float(values[..., column][refused].flat[0]))}")
         return values
+
+    def beyond(self, positions: ArrayLike, joint_names: Sequence[str] | None = None) -> tuple[str, ...]:
+        """One sentence for each joint that positions (..., J) take a hair beyond its limits."""
+        joints = self._named(self.joint_names if joint_names is None else joint_names)
+        values = self.check(positions, joint_names)
+        return tuple(
+            f"{joint.name} at {float(values[..., column][beyond].flat[0]):.6g} is a hair beyond its limits "
+            f"{joint.lower:.6g} to {joint.upper:.6g}: taken as it is"
+            for column, joint in enumerate(joints)
+            if (beyond := joint.is_beyond(values[..., column])).any()
+        )
 
     def link_poses(
         self, positions: ArrayLike, joint_names: Sequence[str] | None = None, *, frame: str | None = None
     ) -> Array:
         """frame_T_link (..., L, 4, 4) of every link at positions (..., J) rad or m; frame None: the root.
 
-        Joints without a given position stay at zero, mimic joints follow their leader.
+        Joints without a given position stay at zero, mimic joints without one follow their leader; a leader
+        without one is where its first given follower has it.
         """
         names = self.joint_names if joint_names is None else tuple(joint_names)
         values = self.check(positions, names)
         given = {name: values[..., column] for column, name in enumerate(names)}
+        for joint in self._named(names):
+            if joint.leader is not None and joint.multiplier:
+                given.setdefault(joint.leader, (given[joint.name] - joint.offset) / joint.multiplier)
         root_T_link = np.empty((*values.shape[:-1], len(self.links), 4, 4))
         root_T_link[..., 0, :, :] = np.eye(4)
         for joint in self.joints:
-            leader = joint.leader or joint.name
-            position = given.get(leader, np.zeros(values.shape[:-1])) * joint.multiplier + joint.offset
+            position = given.get(joint.name)
+            if position is None:
+                led = given.get(joint.leader or joint.name, np.zeros(values.shape[:-1]))
+                position = led * joint.multiplier + joint.offset
             parent = self.link_index(joint.parent)
             moved = root_T_link[..., parent, :, :] @ joint.origin @ _displacement(joint, position)
             root_T_link[..., self.link_index(joint.child), :, :] = moved
@@ -152,14 +131,6 @@ class RobotModel:
     @cached_property
     def _link_indices(self) -> dict[str, int]:
         return {link: index for index, link in enumerate(self.links)}
-
-    def moved_by(self, joint_name: str) -> NDArray[np.bool_]:
-        """Which links (L,) move with a joint: its child, all that hangs on it, and those of mimic joints."""
-        moved = np.zeros(len(self.links), bool)
-        for joint in self.joints:
-            turns = joint_name in (joint.name, joint.leader)
-            moved[self.link_index(joint.child)] = turns or moved[self.link_index(joint.parent)]
-        return moved
 
     def without(self, patterns: Iterable[str]) -> RobotModel:
         """The model without the parts whose ``link/material`` matches a shell pattern; each must match."""
@@ -199,12 +170,18 @@ class RobotModel:
             (*self.joints, mount, *joints),
             (*self.links, *(prefix + link for link in tool.links)),
             (*self.parts, *parts),
+            (*self.notes, *tool.notes),
         )
 
-    def _check_names(self, names: Sequence[str]) -> None:
-        unknown = [name for name in names if name not in self.joint_names]
-        if unknown:
-            raise InputError(f"{self.name} has no joint '{unknown[0]}': it has {', '.join(self.joint_names)}")
+    def _named(self, names: Sequence[str]) -> list[Joint]:
+        """The joints of these names; an `InputError` for one that is not there, fixed, or named twice."""
+        by_name = {joint.name: joint for joint in self.joints if joint.motion is not Motion.FIXED}
+        for name in names:
+            if name not in by_name:
+                raise InputError(f"{self.name} has no joint '{name}': it has {', '.join(self.joint_names)}")
+        if len(set(names)) < len(names):
+            raise InputError(f"{self.name}: a joint is named twice: {', '.join(names)}")
+        return [by_name[name] for name in names]
 
 
 def load_robot(name: str | Path, *, exclude: Iterable[str] = (), meshes: bool = True) -> RobotModel:
@@ -225,8 +202,8 @@ def load_robot(name: str | Path, *, exclude: Iterable[str] = (), meshes: bool = 
         model = _from_urdf(_airo_models() / "arms" / arm / f"{arm}.urdf", arm, meshes)
         model = model.without(_NOT_ON_EVERY_ROBOT) if meshes else model
         if tool:
-            urdf = _airo_models() / "grippers" / GRIPPER / "urdf" / f"{GRIPPER}.urdf"
-            model = model.with_tool(_from_urdf(urdf, GRIPPER, meshes), "tool0", "gripper/")
+            file = _airo_models() / "grippers" / GRIPPER / "urdf" / f"{GRIPPER}.urdf"
+            model = model.with_tool(_from_urdf(file, GRIPPER, meshes), "tool0", "gripper/")
     return model.without(exclude) if meshes else model
 
 
@@ -238,71 +215,11 @@ def _airo_models() -> Path:
 
 
 def _from_urdf(path: Path, name: str, meshes: bool) -> RobotModel:
-    import logging
-
-    import yourdfpy
-
-    logging.getLogger("yourdfpy").setLevel(logging.CRITICAL)  # it reports what it then repairs
     if not path.is_file():
         raise InputError(f"{path}: no such URDF file; known robots: {', '.join(KNOWN_ARMS)}")
-    try:
-        robot = yourdfpy.URDF.load(str(path), build_scene_graph=False, load_meshes=False).robot
-    except Exception as error:  # the parser raises whatever the XML library raises
-        raise InputError(f"{path}: not a readable URDF: {str(error).splitlines()[0]}") from error
-    joints, links = _ordered(
-        [_joint(joint, path) for joint in robot.joints], [link.name for link in robot.links], path
-    )
-    parts = visual_parts(robot, path) if meshes else ()
-    return RobotModel(name, joints, links, parts)
-
-
-def _joint(joint: Any, path: Path) -> Joint:
-    if joint.type not in _MOTIONS:
-        raise InputError(
-            f"{path}: joint '{joint.name}' is {joint.type}: only {', '.join(_MOTIONS)} are supported"
-        )
-    unused = joint.axis is None or joint.type == "fixed"
-    axis = np.array([1.0, 0, 0]) if unused else np.asarray(joint.axis, float)
-    if not np.linalg.norm(axis) > 0:
-        raise InputError(f"{path}: joint '{joint.name}' moves along no axis: correct its <axis xyz=...>")
-    limited = joint.limit is not None and joint.type in ("revolute", "prismatic")
-    return Joint(
-        name=joint.name,
-        motion=_MOTIONS[joint.type],
-        parent=joint.parent,
-        child=joint.child,
-        origin=np.eye(4) if joint.origin is None else np.asarray(joint.origin, float),
-        axis=axis / np.linalg.norm(axis),
-        lower=_or(joint.limit.lower, -np.inf) if limited else -np.inf,
-        upper=_or(joint.limit.upper, np.inf) if limited else np.inf,
-        leader=joint.mimic.joint if joint.mimic else None,
-        multiplier=_or(joint.mimic.multiplier, 1.0) if joint.mimic else 1.0,
-        offset=_or(joint.mimic.offset, 0.0) if joint.mimic else 0.0,
-    )
-
-
-def _or(value: float | None, default: float) -> float:
-    return default if value is None else float(value)
-
-
-def _ordered(joints: list[Joint], links: list[str], path: Path) -> tuple[tuple[Joint, ...], tuple[str, ...]]:
-    """Joints parents first and the links root first; refuses anything that is not one tree."""
-    children = {joint.child for joint in joints}
-    roots = [link for link in links if link not in children]
-    if len(roots) != 1:
-        raise InputError(
-            f"{path}: a robot has one root link, this has {len(roots)}: {', '.join(roots) or 'a loop'}"
-        )
-    order, waiting = [roots[0]], list(joints)
-    ordered: list[Joint] = []
-    while waiting:
-        ready = [joint for joint in waiting if joint.parent in order and joint.child not in order]
-        if not ready:
-            raise InputError(f"{path}: joint '{waiting[0].name}' hangs on no link of the tree")
-        ordered.append(ready[0])
-        order.append(ready[0].child)
-        waiting.remove(ready[0])
-    return tuple(ordered), tuple(order)
+    description = urdf.read(path)
+    parts, notes = visual_parts(description.visuals, path) if meshes else ((), ())
+    return RobotModel(name, description.joints, description.links, parts, (*description.notes, *notes))
 
 
 def _displacement(joint: Joint, position: Array) -> Array:

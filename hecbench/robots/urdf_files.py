@@ -3,41 +3,66 @@
 from __future__ import annotations
 
 from pathlib import Path
-from xml.etree import ElementTree
 
 from hecbench import files
 from hecbench.errors import InputError
+from hecbench.robots import urdf as urdf_reader
+from hecbench.robots.materials import referenced_files
 
-_PACKAGE = "package://"
+_PACKAGES = ("package://", "model://")
 _MESHES = (".stl", ".obj", ".dae", ".ply", ".glb", ".gltf")
+_FOLDERS_ABOVE = 4
+"""Of the URDF, that are searched: description packages nest it by two or three."""
 
 
 def find_mesh(filename: str, urdf: Path) -> Path:
-    """The mesh file: relative to the URDF's folder or one above it, with or without a package's name."""
+    """The mesh file: relative to the URDF's folder or one above it, with or without a package's name.
+
+    The place that agrees with most of the name counts: ``package://arm/visual/a.stl`` is rather ``../visual/a.stl``
+    than an ``a.stl`` beside the URDF. Backslashes separate folders too.
+    """
     if not filename.lower().endswith(_MESHES):
         raise InputError(f"{urdf}: mesh '{filename}' is no mesh file; use one of {' '.join(_MESHES)}")
-    relative = Path(filename.removeprefix(_PACKAGE).removeprefix("file://"))
-    tails = [Path(*relative.parts[skip:]) for skip in range(len(relative.parts))]
-    places = (urdf.parent, *urdf.parent.absolute().parents[:2])
-    for place in places:
-        for tail in tails if filename.startswith(_PACKAGE) else [relative]:
-            if (place / tail).is_file():
-                return place / tail
-    raise InputError(f"{urdf}: mesh '{filename}' is not there: put it beside the URDF or correct its path")
+    if (found := _found(filename, urdf)) is None:
+        raise InputError(
+            f"{urdf}: mesh '{filename}' is not there: put it beside the URDF or correct its path"
+        )
+    return found
+
+
+def find_texture(filename: str, urdf: Path) -> Path | None:
+    """The texture of a URDF material, found like a mesh; None when it is not there."""
+    return _found(filename, urdf)
+
+
+def _found(filename: str, urdf: Path) -> Path | None:
+    of_package = filename.startswith(_PACKAGES)
+    name = filename.removeprefix("file://")
+    for prefix in _PACKAGES:
+        name = name.removeprefix(prefix)
+    places = (urdf.parent, *urdf.parent.absolute().parents[:_FOLDERS_ABOVE])
+    for spelled in dict.fromkeys((name, name.replace("\\", "/"))):
+        parts = Path(spelled).parts
+        tails = [Path(*parts[skip:]) for skip in range(len(parts) if of_package else 1)]
+        for tail in tails:
+            for place in places:
+                if (place / tail).is_file():
+                    return place / tail
+    return None
 
 
 def copy(urdf: Path, folder: Path) -> Path:
-    """Write the URDF with its visual meshes and their material files into a folder; returns the copy.
+    """Write the URDF with its visual meshes, their material files and textures into a folder; returns the copy.
 
-    Collision shapes are left out: nothing here uses them. Meshes of one folder stay together.
+    Collision shapes and other programs' extensions are left out: nothing here uses them. Meshes of one folder
+    stay together.
 
     Raises:
-        InputError: the URDF is no XML, or a mesh is not there.
+        InputError: the URDF is not readable, or a mesh is not there.
     """
-    try:
-        root = ElementTree.fromstring(files.read_bytes(urdf))
-    except ElementTree.ParseError as error:
-        raise InputError(f"{urdf}: not a readable URDF: {error}") from error
+    from lxml import etree
+
+    root = urdf_reader.parse(urdf)
     for link in root.iter("link"):
         for shape in link.findall("collision"):
             link.remove(shape)
@@ -45,19 +70,14 @@ def copy(urdf: Path, folder: Path) -> Path:
     for mesh in root.iter("mesh"):
         source = find_mesh(mesh.get("filename", ""), urdf)
         place = places.setdefault(source.parent, f"meshes/{len(places)}")
-        for path in (source, *_materials(source)):
-            files.write_bytes(folder / place / path.name, files.read_bytes(path))
+        for path in (source, *referenced_files(source)):
+            inside = path.resolve().relative_to(source.parent.resolve()) if path != source else source.name
+            files.write_bytes(folder / place / inside, files.read_bytes(path))
         mesh.set("filename", f"{place}/{source.name}")
-    files.write_bytes(folder / urdf.name, ElementTree.tostring(root))
+    for texture in root.iter("texture"):
+        if (found := find_texture(texture.get("filename", ""), urdf)) is not None:
+            place = places.setdefault(found.parent, f"meshes/{len(places)}")
+            files.write_bytes(folder / place / found.name, files.read_bytes(found))
+            texture.set("filename", f"{place}/{found.name}")
+    files.write_bytes(folder / urdf.name, etree.tostring(root, encoding="utf-8", xml_declaration=True))
     return folder / urdf.name
-
-
-def _materials(mesh: Path) -> list[Path]:
-    """The material files that an OBJ file names and that lie beside it; others are left where they are."""
-    if mesh.suffix.lower() != ".obj":
-        return []
-    lines = files.read_bytes(mesh).decode("utf-8", "replace").splitlines()
-    named = {word for line in lines if line.startswith("mtllib ") for word in line.split()[1:]}
-    folders = mesh.parent.resolve(), mesh.resolve().parent
-    found = (mesh.parent / name for name in named)
-    return sorted(path for path in found if path.is_file() and path.resolve().parent in folders)

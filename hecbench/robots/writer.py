@@ -8,8 +8,9 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
+from hecbench.robots.joints import Joint, Motion
 from hecbench.robots.meshes import Part
-from hecbench.robots.model import Joint, Motion, RobotModel
+from hecbench.robots.model import RobotModel
 
 _PARALLEL = 1e-9
 

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import pickle
+import resource
 import signal
 import subprocess
 import sys
@@ -14,7 +16,9 @@ from typing import Any
 
 from hecbench.errors import HecbenchError
 
-_SERVE = "from hecbench.running import isolation; isolation.serve()"
+_SERVE = "from hecbench.running import isolation; isolation.serve({parent}, {memory})"
+_PR_SET_PDEATHSIG = 1
+"""prctl(2): the signal that the kernel sends when the parent dies."""
 
 
 class Ended(Exception):
@@ -42,8 +46,8 @@ def stdout_to_stderr() -> Iterator[None]:
 class Worker:
     """A process that calls functions, one after the other; it starts with the first call and again after its end."""
 
-    def __init__(self, timeout_s: float | None = None) -> None:
-        self._timeout_s = timeout_s
+    def __init__(self, timeout_s: float | None = None, memory_mb: int | None = None) -> None:
+        self._timeout_s, self._memory_mb = timeout_s, memory_mb
         self._process: subprocess.Popen[bytes] | None = None
 
     def __enter__(self) -> Worker:
@@ -60,8 +64,13 @@ class Worker:
             TookTooLong: it was ended because the time was over.
         """
         if self._process is None:
-            command = [sys.executable, "-c", _SERVE]
-            self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+            code = _SERVE.format(parent=os.getpid(), memory=self._memory_mb)
+            self._process = subprocess.Popen(
+                [sys.executable, "-c", code],
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                start_new_session=True,  # Ctrl-C is the parent's to handle
+            )
         process = self._process
         assert process.stdin is not None
         assert process.stdout is not None
@@ -90,6 +99,11 @@ class Worker:
             raise answer
         return answer
 
+    def kill(self) -> None:
+        """End the process now, from any thread; a call that waits for it raises `Ended`."""
+        if (process := self._process) is not None:
+            process.kill()
+
     def _end(self) -> None:
         if self._process is not None:
             self._process.kill()
@@ -98,13 +112,23 @@ class Worker:
 
 
 def _how(returncode: int) -> str:
-    if returncode < 0 and returncode != -signal.SIGKILL:
+    if returncode == -signal.SIGKILL:
+        return "its process was ended by SIGKILL (out of memory?)"
+    if returncode < 0:
         return f"its process ended by {signal.Signals(-returncode).name}"
     return "its process ended without an answer"
 
 
-def serve() -> None:
-    """Answer requests from stdin until it is closed; stdout carries answers, everything printed goes to stderr."""
+def serve(parent: int, memory_mb: int | None) -> None:
+    """Answer requests from stdin until it is closed; stdout carries answers, everything printed goes to stderr.
+
+    The process ends with its parent, even when that is killed, and gets a `MemoryError` above `memory_mb` of data.
+    """
+    ctypes.CDLL(None).prctl(_PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != parent:
+        return
+    if memory_mb is not None:
+        resource.setrlimit(resource.RLIMIT_DATA, (memory_mb * 2**20,) * 2)
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     while True:

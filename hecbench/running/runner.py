@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 from hecbench import diagnose, registry, threads
-from hecbench.errors import InputError
-from hecbench.estimate import Estimate
+from hecbench.estimate import Estimate, Status, Termination
 from hecbench.preparation import load_recording, prepare, segmented
 from hecbench.recording import Recording
+from hecbench.running import pool
+from hecbench.running.calibrating import evidence_from
+from hecbench.running.isolation import Ended
 from hecbench.running.solving import Options, each_solved, provenance
 from hecbench.specs import Kind, SolverSpec, SuiteSpec
 from hecbench.storage import evidence, store
@@ -65,14 +64,9 @@ def execute(task: Task, options: Options) -> tuple[list[Estimate], Evidence | No
         replace(estimate, suite=task.suite or "files", level=task.level, item=task.item)
         for estimate in each_solved(prepared, specs, options, origin)
     ]
-    return estimates, None if task.path is None else _examined(recording, ready)
-
-
-def _examined(recording: Recording, prepared: Recording) -> Evidence:
-    findings = diagnose.check(recording, prepared)
-    influence = next((dict(f.per_sample) for f in findings if f.id == "influence"), {})
-    influence_mm = np.array([influence.get(sample, np.nan) for sample in recording.sample_ids])
-    return evidence.collect(prepared, recording.sha256, [f.to_json() for f in findings], influence_mm)
+    if task.path is None:
+        return estimates, None
+    return estimates, evidence_from(recording, ready, diagnose.check(recording, ready))
 
 
 def remaining(tasks: Iterable[Task], done: Iterable[Estimate], options: Options) -> list[Task]:
@@ -124,11 +118,13 @@ def _executed(
     if executor is None and (jobs == 1 or len(tasks) < 2):
         yield from (execute(task, options) for task in tasks)
         return
-    from joblib import Parallel, delayed
-
-    with _backend(executor):
-        parallel = Parallel(n_jobs=jobs if executor is None else -1, return_as="generator_unordered")
-        yield from parallel(delayed(_execute_alone)(task, options) for task in tasks)
+    running = (
+        pool.on_this_machine(_execute_alone, tasks, (options,), jobs)
+        if executor is None
+        else pool.on_cluster(_execute_alone, tasks, (options,), executor)
+    )
+    for task, result in running:
+        yield (_lost(task, options, str(result)), None) if isinstance(result, Ended) else result
 
 
 def _execute_alone(task: Task, options: Options) -> tuple[list[Estimate], Evidence | None]:
@@ -137,23 +133,16 @@ def _execute_alone(task: Task, options: Options) -> tuple[list[Estimate], Eviden
     return execute(task, options)
 
 
-@contextmanager
-def _backend(executor: str | None) -> Iterator[None]:
-    """joblib's own processes, or the workers of the dask scheduler at a URL."""
-    if executor is None:
-        yield
-        return
-    from joblib import parallel_config
-
-    try:
-        from distributed import Client
-
-        client = Client(executor, timeout="5s", set_as_default=False)
-    except ImportError:
-        raise InputError("--executor needs dask: pip install 'hecbench[cluster]'") from None
-    except (OSError, ValueError, TypeError) as error:
-        raise InputError(
-            f"--executor {executor}: no scheduler answers ({error}); give its tcp://host:port"
-        ) from error
-    with client, parallel_config(backend="dask", client=client):
-        yield
+def _lost(task: Task, options: Options, reason: str) -> list[Estimate]:
+    """The results of a task whose process died."""
+    ended = Estimate(
+        status=Status.FAILED,
+        reason=reason,
+        termination=Termination.STALLED,
+        recording=task.item,
+        suite=task.suite or "files",
+        level=task.level,
+        item=task.item,
+        provenance={"seed": options.seed, "masks": options.segmenter, "command": options.command},
+    )
+    return [replace(ended, solver=solver) for solver in task.solvers]

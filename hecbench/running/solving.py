@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from hecbench import __version__, registry
+from hecbench import __version__, lens, registry
 from hecbench.errors import InputError, InvalidAnswer, Refusal, SolverFailure
 from hecbench.estimate import Estimate, Status, Termination
 from hecbench.preparation import Segmented, prepare, segmented
@@ -51,6 +51,7 @@ class Options:
         segmenter: whose masks the solvers get; None: the recording's own, where it has some.
         stop_on_bad_input: raise when a solver finds a damaged image, instead of reporting it as a failure.
         timeout_s: for each call of a solver, in a process of its own; None: as long as it takes.
+        memory_mb: of data, for each call of a solver, in a process of its own; None: as much as there is.
     """
 
     seed: int = 0
@@ -59,6 +60,7 @@ class Options:
     segmenter: str | None = None
     stop_on_bad_input: bool = True
     timeout_s: float | None = None
+    memory_mb: int | None = None
 
 
 def solve(
@@ -110,8 +112,9 @@ def provenance(recording: Recording, options: Options) -> dict[str, Any]:
 
 @contextmanager
 def _caller(spec: SolverSpec, options: Options) -> Iterator[Callable[[Recording], Estimate]]:
-    """The function that runs a solver: in a process of its own when it is a stranger's, or may take only so long."""
-    if options.timeout_s is None and not registry.load().is_foreign(spec.name):
+    """The function that runs a solver: in a process of its own when it is a stranger's, or has a limit."""
+    limited = options.timeout_s is not None or options.memory_mb is not None
+    if not limited and not registry.load().is_foreign(spec.name):
 
         def here(part: Recording) -> Estimate:
             with isolation.stdout_to_stderr():
@@ -119,7 +122,7 @@ def _caller(spec: SolverSpec, options: Options) -> Iterator[Callable[[Recording]
 
         yield here
         return
-    with isolation.Worker(options.timeout_s) as worker:
+    with isolation.Worker(options.timeout_s, options.memory_mb) as worker:
 
         def elsewhere(part: Recording) -> Estimate:
             start = perf_counter()
@@ -185,6 +188,9 @@ def _unanswered(
 
 
 def _labelled(estimate: Estimate, blind: Recording, spec: SolverSpec, seconds: float) -> Estimate:
+    own, given = estimate.camera, blind.camera
+    if own is not None and given is not None and not lens.same(own, given):
+        estimate = replace(estimate, diagnostics={**estimate.diagnostics, "camera_changed": True})
     return replace(
         estimate,
         solver=spec.name,

@@ -40,11 +40,13 @@ class Writer(Generic[T]):
         """Write the items, each as one line, and wait until they are on disk."""
         for item in items:
             line = self._encode(item) + b"\n"
+            before = os.fstat(self._descriptor).st_size
             try:
                 whole = os.write(self._descriptor, line) == len(line)
             except OSError as error:
                 raise HecbenchError(f"{self._path}: cannot be written ({error.strerror})") from error
             if not whole:
+                os.ftruncate(self._descriptor, before)
                 raise HecbenchError(f"{self._path}: could not be written completely: is the disk full?")
         os.fsync(self._descriptor)
 

@@ -1,6 +1,7 @@
 """One simulated controller per test process, as new before every test, and the driver on it."""
 
 import socket
+import time
 
 import numpy as np
 import pytest
@@ -10,8 +11,13 @@ from hecbench_hardware.kinematics import ARMS
 from hecbench_hardware.ur.robot import UrRobot
 from hecbench_hardware.ur.stream import Supervision
 
-PATIENT = Supervision(max_age_s=1.0, late_s=1.0)
+PATIENT = Supervision(max_age_s=1.0, late_s=10.0, leniency=10.0)
 """A busy test machine delays the stream; a laboratory's does not."""
+
+
+@pytest.fixture
+def patient():
+    return PATIENT
 
 
 @pytest.fixture(scope="session")
@@ -68,3 +74,16 @@ def registers(controller):
 def ready_pose():
     """Joints away from singularities, tool down."""
     return np.array([0.3, -1.4, 1.5, -1.6, -1.5, 0.2])
+
+
+@pytest.fixture
+def wait_until():
+    """Waits for a condition, patient on a busy machine."""
+
+    def wait(condition, timeout_s=20.0):
+        deadline = time.monotonic() + timeout_s
+        while not condition():
+            assert time.monotonic() < deadline, "it did not happen in time"
+            time.sleep(0.005)
+
+    return wait

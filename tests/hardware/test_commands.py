@@ -20,7 +20,7 @@ from hecbench.recording import CameraModel, Mounting, Recording, RobotDescriptio
 from hecbench.storage import recording_io
 from hecbench.targets import ChessboardTarget
 
-FAST = ("--set", "robot.time_scale=50", "--set", "robot.max_age_s=1")
+FAST = ("--set", "robot.time_scale=50", "--set", "robot.max_age_s=5", "--set", "robot.leniency=10")
 
 
 @pytest.fixture

@@ -6,8 +6,10 @@ import subprocess
 import sys
 import threading
 import time
+from dataclasses import replace
 
 import numpy as np
+import psutil
 import pytest
 from hecbench_hardware.devices import DeviceFault, Fault
 from hecbench_hardware.ur.dashboard import Dashboard
@@ -27,7 +29,7 @@ from hecbench_hardware.kinematics import ARMS
 from hecbench_hardware.ur.robot import UrRobot
 from hecbench_hardware.ur.stream import Supervision
 host, what, age_s = sys.argv[1:]
-with UrRobot(host, ARMS["ur5e"], supervision=Supervision(max_age_s=float(age_s))) as robot:
+with UrRobot(host, ARMS["ur5e"], supervision=Supervision(max_age_s=float(age_s), late_s=30, leniency=10)) as robot:
     robot.enable()
     here = robot.settle()
     target = here.base_T_flange.copy()
@@ -66,9 +68,11 @@ def program(controller):
 
     yield start
     for process in started:
+        clients = clients_of(process) if process.poll() is None else []
         process.send_signal(signal.SIGCONT)
         process.kill()
         process.communicate()
+        assert not psutil.wait_procs(clients, 30)[1]
 
 
 def until(condition, timeout_s):
@@ -78,6 +82,11 @@ def until(condition, timeout_s):
         assert time.monotonic() - begun < timeout_s, "it did not happen in time"
         time.sleep(0.01)
     return time.monotonic() - begun
+
+
+def clients_of(process):
+    """The processes in which a program's clients of the controller live."""
+    return psutil.Process(process.pid).children()
 
 
 def is_playing(controller):
@@ -109,13 +118,13 @@ def test_the_watchdog_alone_stops_the_arm_of_a_frozen_client(program, controller
     """Program and client are frozen together, as when the computer hangs."""
     moving = program("joints")
     until(lambda: float(controller.ask("speed")) > 0, 30)
-    children = subprocess.run(["ps", "-o", "pid=", "--ppid", str(moving.pid)], capture_output=True, text=True)
-    for pid in [moving.pid, *map(int, children.stdout.split())]:
-        os.kill(pid, signal.SIGSTOP)
+    clients = clients_of(moving)
+    for process in (moving, *clients):
+        process.send_signal(signal.SIGSTOP)
     until(lambda: float(controller.ask("speed")) == 0, 1 / WATCHDOG_HZ + BUSY_S)
     assert "watchdog" in controller.ask("log")
-    for pid in map(int, children.stdout.split()):
-        os.kill(pid, signal.SIGKILL)
+    for client in clients:
+        client.kill()
 
 
 def test_at_rest_a_program_may_be_busy(program, controller):
@@ -129,16 +138,21 @@ def test_at_rest_a_program_may_be_busy(program, controller):
     assert resting.stdout.readline() == "arrived\n"
 
 
-def test_supervision_that_hangs_stops_the_motion(connect, controller, monkeypatch):
+def test_supervision_that_hangs_stops_the_motion(connect, patient, controller, monkeypatch):
     """The thread that judges states hangs; the one that polls the motion does not."""
     controller.fault("unmarked")
-    robot = connect(supervision=Supervision(max_age_s=AGE_S))
+    robot = connect(supervision=replace(patient, max_age_s=AGE_S))
     robot.enable()
     hang, take = threading.Event(), robot._stream._take
     monkeypatch.setattr(
         robot._stream, "_take", lambda sample: take(sample) if not hang.is_set() else time.sleep(0.1)
     )
-    threading.Timer(0.3, hang.set).start()
+
+    def hang_while_moving():
+        until(lambda: float(controller.ask("speed")) > 0, 30)
+        hang.set()
+
+    threading.Thread(target=hang_while_moving).start()
     with pytest.raises(DeviceFault) as caught:
         robot.move_joints(robot.state().joints_rad + 2 * np.eye(6)[0], speed_rad_s=0.0004)
     assert caught.value.fault is Fault.STALE

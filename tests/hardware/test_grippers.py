@@ -7,6 +7,7 @@ import time
 
 import pytest
 import rtde_receive
+from hecbench_hardware.controller_sim.robotiq import RobotiqSocket
 from hecbench_hardware.devices import DeviceFault, Fault, GripperStatus
 from hecbench_hardware.grippers import robotiq
 from hecbench_hardware.grippers.onrobot import UNIT, OnRobotGripper
@@ -72,6 +73,52 @@ def test_robotiq_bad_input(two_finger, controller):
         gripper("robotiq")
     with pytest.raises(InputError, match="not a number"):
         gripper("robotiq", host=controller.host, timeout_s="soon")
+
+
+class PieceByPiece(socketserver.BaseRequestHandler):
+    """A gripper whose answers arrive in pieces, as TCP may deliver them."""
+
+    def handle(self):
+        simulated = RobotiqSocket()
+        for line in self.request.makefile("r"):
+            answer = simulated.answer(line)
+            simulated.step(10.0)
+            for at in range(len(answer)):
+                self.request.sendall(answer[at : at + 1])
+                time.sleep(0.002)
+
+
+def test_robotiq_answers_in_pieces(monkeypatch):
+    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), PieceByPiece) as server:
+        thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
+        thread.start()
+        monkeypatch.setattr(robotiq, "PORT", server.server_address[1])
+        device = RobotiqGripper("127.0.0.1", timeout_s=20.0)
+        device.enable()
+        device.open_fingers(0.04)
+        assert device.status().width_m == pytest.approx(0.04, abs=2e-4)
+        device.close()
+        server.shutdown()
+        thread.join()
+
+
+class HangsUp(socketserver.BaseRequestHandler):
+    def handle(self):
+        self.request.recv(100)
+        self.request.sendall(b"ac")
+
+
+def test_robotiq_half_an_answer_is_none(monkeypatch):
+    with socketserver.ThreadingTCPServer(("127.0.0.1", 0), HangsUp) as server:
+        thread = threading.Thread(target=server.serve_forever, kwargs={"poll_interval": 0.01})
+        thread.start()
+        monkeypatch.setattr(robotiq, "PORT", server.server_address[1])
+        device = RobotiqGripper("127.0.0.1", timeout_s=20.0)
+        with pytest.raises(DeviceFault, match="connection closed"):
+            device.enable()
+        device.close()
+        server.shutdown()
+        thread.join()
 
 
 class ComputeBox(socketserver.StreamRequestHandler):
@@ -146,6 +193,9 @@ def test_onrobot_faults(compute_box):
     compute_box.answer = lambda request: bytes([request[0] | 0x80, 2])
     with pytest.raises(DeviceFault, match="Modbus exception 2"):
         device.status()
+    compute_box.answer = lambda request: bytes([3, 2, 0, 1])
+    with pytest.raises(DeviceFault, match="4 bytes instead of 2 registers"):
+        device.status()
     compute_box.answer = lambda request: time.sleep(0.5) or b"\x03"
     with pytest.raises(DeviceFault, match="no answer"):
         device.status()
@@ -184,7 +234,7 @@ def test_nothing_is_sent_to_fingers_before_they_are_enabled(controller, compute_
     assert receive.getActualDigitalOutputBits() == outputs
 
 
-def test_digital_output(controller):
+def test_digital_output(wait_until, controller):
     receive = rtde_receive.RTDEReceiveInterface(controller.host)
     device = gripper("digital_output", host=controller.host, bank="tool", number=1, stroke_s=0.1)
     device.enable()

@@ -82,7 +82,7 @@ def test_yes_does_not_answer_for_a_person_after_a_fault(real, cell, tmp_path, ve
     actor = while_moving(real, *verbs)
     result = run(
         record, cell, "--out", tmp_path / "out", "--robot", "ur5e", "--host", real.host, "--arm", "--yes",
-        "--set", "robot.max_age_s=1",
+        "--set", "robot.max_age_s=1", "--set", "robot.leniency=10",
     )  # fmt: skip
     actor.join()
     assert result.exit_code == 1, result.output

@@ -139,3 +139,11 @@ def test_transform_points_and_errors(rng):
     np.testing.assert_allclose(se3.transform_points(a_T_b, points), expected, atol=1e-12)
     assert se3.translation_error_m(a_T_b, a_T_c) == pytest.approx(np.linalg.norm(a_T_b[:3, 3] - a_T_c[:3, 3]))
     assert se3.rotation_error_rad(a_T_b, a_T_b) == 0
+
+
+@pytest.mark.parametrize("angle", [1e-9, 1e-6, 1e-5, 1e-3, 1.0, 3.0])
+def test_left_jacobian_is_the_mean_of_the_rotations_on_the_way(angle):
+    phi = angle * np.array([0.6, -0.64, 0.48])
+    nodes, weights = np.polynomial.legendre.leggauss(20)
+    mean = np.einsum("n,nij->ij", weights / 2, se3.so3_exp((nodes[:, None] + 1) / 2 * phi))
+    np.testing.assert_allclose(se3.left_jacobian(phi), mean, atol=1e-13 + 1e-9 * angle**2)

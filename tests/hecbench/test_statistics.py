@@ -53,6 +53,21 @@ def test_ranks_are_shared_where_intervals_overlap():
     assert statistics.shared_ranks([Interval(2, np.nan, np.nan), Interval(1, np.nan, np.nan)]) == [2, 1]
 
 
+def test_cluster_bootstrap_of_unequal_clusters_agrees_with_resampling_by_hand(rng):
+    sizes = [1, 2, 20, 3, 1, 30, 2, 5]
+    clusters = np.repeat(np.arange(len(sizes)), sizes)
+    values = rng.normal(size=len(sizes))[clusters] + 0.1 * rng.normal(size=len(clusters))
+    found = statistics.cluster_bootstrap(values, clusters)
+    groups = [values[clusters == k] for k in range(len(sizes))]
+    means = [
+        np.concatenate([groups[k] for k in rng.integers(0, len(groups), len(groups))]).mean()
+        for _ in range(4000)
+    ]
+    low, high = np.percentile(means, [2.5, 97.5])
+    assert found.value == pytest.approx(values.mean())
+    assert (found.low, found.high) == pytest.approx((low, high), abs=0.08 * (high - low))
+
+
 def test_intervals_do_not_depend_on_the_order_of_the_values():
     rng = np.random.default_rng(1)
     values, clusters = rng.normal(0, 1, 40), np.repeat(np.arange(10), 4)

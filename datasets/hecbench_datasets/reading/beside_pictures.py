@@ -4,26 +4,24 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from hecbench import pictures, preparation, se3
+from hecbench import pictures
 from hecbench.errors import InputError
-from hecbench.exchange.conventions import HINTS_NAME, Proof, prove
-from hecbench.exchange.pose_numbers import Reading, readings
-from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
+from hecbench.exchange.conventions import HINTS_NAME
+from hecbench.exchange.pose_numbers import readings
+from hecbench.recording import CameraModel, Mounting, Recording
 from hecbench_datasets.reading.cameras import camera_in
 from hecbench_datasets.reading.columns import Columns, Poses
 from hecbench_datasets.reading.hints import Hints, hinted_target
 from hecbench_datasets.reading.joint_poses import JointReading, joint_readings
+from hecbench_datasets.reading.pictured_proof import Way, settled
 from hecbench_datasets.reading.seen_targets import seen_target
-from hecbench_datasets.reading.sources import Array, natural
+from hecbench_datasets.reading.sources import natural
 from hecbench_datasets.reading.survey import Survey
-
-_MOST_LOOKED_AT = 3
-"""Readings under which the pictures are searched again."""
 
 
 @dataclass(frozen=True)
@@ -70,41 +68,20 @@ def load_beside_pictures(
         joints_rad=np.zeros((len(beside.images), 1)),
         images=tuple(beside.images),
         folder=found.path if found.path.is_dir() else found.path.parent,
-    )
-    if target is None or (told and len(ways) == 1):
-        way, mounting = ways[0], recording.mounting
-        notes.append(f"{found.path}: read as {mounting}, {way.reading.text}, as told")
-    else:
-        proof = _proven(found.path, ways, recording, hints)
-        way = next(way for way in ways if way.reading.text == proof.robot_text)
-        mounting = proof.mounting
-        notes.append(proof.note)
-    return replace(
-        recording,
-        mounting=mounting,
-        robot=way.robot,
-        base_T_flange=None if way.robot and way.robot.source else way.reading.poses,
-        joints_rad=way.joints_rad,
         notes=tuple(notes),
     )
+    return settled(found.path, recording, ways, hints, told and (target is None or len(ways) == 1))
 
 
-@dataclass(frozen=True, eq=False)
-class _Way:
-    reading: Reading
-    robot: RobotDescription | None = None
-    joints_rad: Array | None = None
-
-
-def _ways(beside: Beside, hints: Hints, robots: Sequence[str | Path]) -> list[_Way]:
+def _ways(beside: Beside, hints: Hints, robots: Sequence[str | Path]) -> list[Way]:
     """Every reading of the robot's rows."""
     if beside.poses is None:
         assert beside.stream.joints is not None
         joints = beside.stream.joints[beside.rows]
         found: list[JointReading] = joint_readings(joints, beside.stream.joint_names, robots)
-        return [_Way(one.reading, one.robot, one.joints_rad) for one in found]
+        return [Way(one.reading, one.robot, one.joints_rad) for one in found]
     return [
-        _Way(reading)
+        Way(reading)
         for reading in readings(
             beside.poses.numbers[beside.rows],
             ("base", "flange"),
@@ -114,56 +91,6 @@ def _ways(beside: Beside, hints: Hints, robots: Sequence[str | Path]) -> list[_W
             inverted=None if hints.robot_pose is None else hints.robot_pose == "flange_T_base",
         )
     ]
-
-
-def _proven(path: Path, ways: Sequence[_Way], recording: Recording, hints: Hints) -> Proof:
-    """The reading that holds the target still in the pictures that show it.
-
-    A board that looks the same from two ends is turned as the robot's motion demands, so the pictures are looked at
-    again under the readings that the angles allow.
-    """
-    seen = preparation.prepare(recording)
-    try:
-        return _held_still(path, ways, seen, hints)
-    except InputError as as_first_seen:
-        if seen.camera_T_target is None:
-            raise
-        for way in _by_angles(ways, seen.camera_T_target)[:_MOST_LOOKED_AT]:
-            turned = preparation.prepare(replace(recording, base_T_flange=way.reading.poses))
-            try:
-                return _held_still(path, ways, turned, hints)
-            except InputError:
-                continue
-        raise as_first_seen
-
-
-def _held_still(path: Path, ways: Sequence[_Way], seen: Recording, hints: Hints) -> Proof:
-    if seen.camera_T_target is None:
-        raise InputError(
-            f"{path}: {'; '.join(seen.notes) or 'the target is not seen'}; correct target in {HINTS_NAME}"
-        )
-    shown = np.asarray(np.isfinite(seen.camera_T_target).all((1, 2)))
-    robot = [replace(way.reading, poses=way.reading.poses[shown]) for way in ways]
-    target = [Reading(seen.camera_T_target[shown], "camera_T_target seen")]
-    mountings = [hints.mounting] if hints.mounting else list(Mounting)
-    proof = prove(str(path), robot, target, mountings, hints.mounting is not None)
-    return replace(proof, note=f"{proof.note} (target seen in {shown.sum()} of {len(shown)} pictures)")
-
-
-def _by_angles(ways: Sequence[_Way], camera_T_target: Array) -> list[_Way]:
-    """One reading of each set of angles, those first that the target turns by, whichever end it is read from."""
-    shown = np.flatnonzero(np.isfinite(camera_T_target).all((1, 2)))
-    before, after = shown[:-1], shown[1:]
-    quarters = se3.so3_exp(np.outer(np.arange(4) * np.pi / 2, [0, 0, 1]))
-    relative = np.swapaxes(camera_T_target[before, :3, :3], 1, 2) @ camera_T_target[after, :3, :3]
-    seen = se3.rotation_angle(relative[:, None] @ quarters)
-    angles = [se3.rotation_error_rad(way.reading.poses[before], way.reading.poses[after]) for way in ways]
-    gaps = [float(np.abs(seen - turned[:, None]).min(1).mean()) for turned in angles]
-    kept: list[int] = []
-    for i in np.argsort(gaps, kind="stable"):
-        if not any(np.allclose(angles[i], angles[k], atol=1e-6) for k in kept):
-            kept.append(int(i))
-    return [ways[i] for i in kept]
 
 
 def _paired(found: Survey, stream: Columns, poses: Poses | None, hints: Hints) -> Beside:

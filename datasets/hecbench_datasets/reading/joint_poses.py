@@ -15,10 +15,11 @@ from hecbench.robots.model import KNOWN_ARMS, load_robot
 from hecbench_datasets.reading.arms import PANDA
 from hecbench_datasets.reading.sources import Array
 
+_RADIANS = {"rad": 1.0, "deg": np.pi / 180}
 _LIMITS = {"rad": (0.0, 3 * np.pi), "deg": (np.pi / 2, np.inf)}
 """Between which the largest angle of a recording lies."""
-_FLANGES = ("tool0", "flange", "panda_link8", "panda_hand", "fr3_link8", "link_eef")
-_BASES = ("base", "base_link", "panda_link0", "fr3_link0", "link_base")
+FLANGES = ("tool0", "flange", "panda_link8", "panda_hand", "fr3_link8", "link_eef")
+BASES = ("base", "base_link", "panda_link0", "fr3_link0", "link_base")
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,13 +31,16 @@ class JointReading:
     joints_rad: Array
 
 
-def joint_readings(joints: Array, names: Sequence[str], robots: Sequence[str | Path]) -> list[JointReading]:
+def joint_readings(
+    joints: Array, names: Sequence[str], robots: Sequence[str | Path], units: Sequence[str] = ("rad", "deg")
+) -> list[JointReading]:
     """Every arm and unit that the joints fit.
 
     Args:
         joints: (N, J), rad or degrees.
         names: of the columns; those of a URDF's joints put them into its order.
         robots: names of known arms, or URDF files; none: every known arm.
+        units: "rad", "deg" or both.
 
     Raises:
         InputError: no arm has so many joints, or they lie outside all limits.
@@ -44,11 +48,11 @@ def joint_readings(joints: Array, names: Sequence[str], robots: Sequence[str | P
     found: list[JointReading] = []
     faults = []
     for robot in robots or (*KNOWN_ARMS, "panda"):
-        for unit, factor in (("rad", 1.0), ("deg", np.pi / 180)):
+        for unit in units:
             if not _LIMITS[unit][0] < np.abs(joints).max() < _LIMITS[unit][1]:
                 continue
             try:
-                found += _of_robot(robot, joints * factor, names, unit)
+                found += _of_robot(robot, joints * _RADIANS[unit], names, unit)
             except InputError as error:
                 faults.append(str(error))
     if not found:
@@ -86,8 +90,8 @@ def _described(
         raise InputError(
             f"{robot}: has {len(own)} joints, the table {joints.shape[1]}; name its columns as the joints"
         )
-    base = next((link for link in _BASES if link in model.links), model.links[0])
-    flange = next((link for link in _FLANGES if link in model.links), model.joints[-1].child)
+    base = next((link for link in BASES if link in model.links), model.links[0])
+    flange = next((link for link in FLANGES if link in model.links), model.joints[-1].child)
     described = RobotDescription(
         model=str(robot) if known else None,
         urdf=None if known else Path(robot),

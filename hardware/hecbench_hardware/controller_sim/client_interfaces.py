@@ -21,6 +21,7 @@ _PRIMARY: Final = (30001, 30011)
 _REALTIME: Final = (30003, 30013)
 _READ_ONLY: Final = (30011, 30012, 30013)
 _STATE_S = 0.1
+Encoder = Callable[[ProgramRunner, tuple[int, ...]], bytes]
 _REALTIME_S, _OLD_REALTIME_S = 0.002, 0.008
 """The e-Series sends 500 states a second, the CB series 125."""
 _FIRST_E_SERIES = 5
@@ -33,17 +34,17 @@ class ClientInterfaces:
 
     program: ProgramRunner
     version: tuple[int, int, int, int]
-    _encoded: dict[Callable[[ProgramRunner], bytes], tuple[int, bytes]] = field(default_factory=dict)
+    _encoded: dict[Encoder, tuple[int, bytes]] = field(default_factory=dict)
 
     def channel(self, port: int) -> ScriptChannel:
         """A conversation for a new client."""
         return ScriptChannel(self, port)
 
-    def encoded(self, encode: Callable[[ProgramRunner], bytes]) -> bytes:
+    def encoded(self, encode: Encoder) -> bytes:
         """The state of this cycle."""
         cycle, content = self._encoded.get(encode, (-1, b""))
         if cycle != self.program.cycle:
-            content = encode(self.program)
+            content = encode(self.program, self.version)
             self._encoded[encode] = (self.program.cycle, content)
         return content
 

@@ -30,8 +30,8 @@ _REPEATED: Final = frozenset({6, 9, 10, 11, 24, 25, 26, 27, 38, 58, *range(66, 7
 """Commands that the script runs in every cycle while their number stays in the register."""
 _HOLD_CYCLES = 10
 """How long a result stays after the client took its question back."""
-_FRESH_S = 0.1
-"""A repeated question that the client has not written for so long is over."""
+_FRESH_S = 0.01
+"""A repeated question that the client has not written for so long is over, so that the next one finds no answer."""
 _NUMBER = r"[-+0-9.eE]+"
 _MOVE = re.compile(rf"move([jlp])\((p?)\[([^\]]*)\],\s*a=({_NUMBER}),\s*v=({_NUMBER})")
 _SERVO_DECELERATION_RAD_S2 = 10.0

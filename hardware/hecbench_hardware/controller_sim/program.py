@@ -6,6 +6,8 @@ from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from functools import partial
 
+import numpy as np
+
 from hecbench.se3 import Array
 from hecbench_hardware.controller_sim.arm import ScriptError, SimulatedArm
 from hecbench_hardware.controller_sim.force import ForceTask
@@ -105,6 +107,7 @@ class ProgramRunner:
             program.close()
         self.runtime, self.freedrive, self.force, self.watchdog = RuntimeState.STOPPED, False, None, None
         self.popup, self.line = None, 0
+        self.arm.joint_speeds = np.zeros(6)
 
     def pause(self) -> bool:
         """Hold the program where it is; false when none runs."""

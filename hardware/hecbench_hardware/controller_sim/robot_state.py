@@ -1,4 +1,4 @@
-"""The state message of the primary and secondary interfaces (maker's "Client interfaces", software 5.10)."""
+"""The state message of the primary and secondary interfaces (maker's "Client interfaces", software 3.4 to 5.10)."""
 
 from __future__ import annotations
 
@@ -22,12 +22,16 @@ _CABINET, _MASTERBOARD_VERSION = 3, 5
 _ROBOT_TYPES = {"ur3e": 3, "ur5e": 1, "ur10e": 2}
 _TWISTS = (pi / 2, 0.0, 0.0, pi / 2, -pi / 2, 0.0)
 _BAUD = 115200
+_RESERVED_BYTE, _E_SERIES = (3, 5), (5,)
+"""From which version on the mode ends with a reserved byte, and the tool flange has packages of its own."""
+
+Version = tuple[int, ...]
 
 
-def robot_state(program: ProgramRunner) -> bytes:
-    """The message of this cycle."""
-    parts = (
-        _part(_MODE, _mode(program)),
+def robot_state(program: ProgramRunner, version: Version) -> bytes:
+    """The message of this cycle, as this version of the software lays it out."""
+    parts = [
+        _part(_MODE, _mode(program)[: None if version >= _RESERVED_BYTE else -1]),
         _part(_JOINTS, _joints(program)),
         _part(_TOOL, _tool(program)),
         _part(_MASTERBOARD, _masterboard(program)),
@@ -36,12 +40,19 @@ def robot_state(program: ProgramRunner) -> bytes:
         _part(_CONFIGURATION, _configuration(program)),
         _part(_FORCE, struct.pack(">7d", *program.arm.wrench, nan)),
         _part(_ADDITIONAL, struct.pack(">BB?B", program.freedrive, True, False, 0)),
+    ]
+    if version >= _E_SERIES:
+        parts += _tool_flange()
+    body = b"".join(parts)
+    return struct.pack(">iB", 5 + len(body), _ROBOT_STATE) + body
+
+
+def _tool_flange() -> list[bytes]:
+    return [
         _part(_TOOL_LINE, struct.pack(">?iiiff", False, _BAUD, 0, 1, 1.5, 3.5)),
         _part(_TOOL_MODE, bytes(3)),
         _part(_SINGULARITY, bytes(2)),
-    )
-    body = b"".join(parts)
-    return struct.pack(">iB", 5 + len(body), _ROBOT_STATE) + body
+    ]
 
 
 def _part(kind: int, body: bytes) -> bytes:

@@ -253,6 +253,7 @@ def serve(
     arm = SimulatedArm(arm_named(model))
     arm.dt_s = CYCLE_S * time_scale
     server = _Server(host, version, ProgramRunner(arm, RobotiqSocket(), host))
+    _ = arm.tcp_vector  # the first pose loads SciPy, which would hold up the cycles later
     try:
         server.listen()
         stopped: list[bool] = []

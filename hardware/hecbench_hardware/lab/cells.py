@@ -91,9 +91,14 @@ class Station:
         )
 
     def scene(
-        self, *, flange_tag: FlangeTag | None = None, workpiece: bool = False, peg: bool = False
+        self,
+        *,
+        flange_tag: FlangeTag | None = None,
+        workpiece: bool = False,
+        peg: bool = False,
+        room: int = 0,
     ) -> Scene:
-        """The arm in the room, with its gripper, and what else is in it."""
+        """The arm in the room, with its gripper, and what else is in it; `room` is the seed of the clutter."""
         return Scene(
             self.robot,
             joint_names=self.joint_names,
@@ -103,7 +108,7 @@ class Station:
             peg_of=self.gripper if peg else None,
             flange_tag=flange_tag,
             workpiece=workpiece,
-            surroundings=Surroundings(base_T_room=self.base_T_room),
+            surroundings=Surroundings(room, base_T_room=self.base_T_room),
         )
 
     def camera_pose(self, number: int) -> Array:

@@ -19,6 +19,7 @@ from hecbench_hardware.lab.scene import FlangeTag
 
 _TRIES = 4000
 _SENSOR = Sensor(supersample=2, noise=2.0)
+_PHOTOGRAPH = Sensor(supersample=2, noise=5.0)
 _START_ERROR = np.array([0.05] * 3 + [0.08] * 3)
 _VIEW_SPREAD_RAD = np.deg2rad(10.0)
 
@@ -88,9 +89,18 @@ def marker_recording(
 
 
 def view_recording(
-    calibration: int, seed: int = 0, station: Station | None = None, samples: int = 10
+    calibration: int,
+    seed: int = 0,
+    station: Station | None = None,
+    samples: int = 10,
+    *,
+    sensor: Sensor = _SENSOR,
+    room: int = 0,
 ) -> Recording:
-    """Pictures of the arm around a configuration with masks, truth and a start some centimetres off."""
+    """Pictures of the arm around a configuration with masks, truth and a start some centimetres off.
+
+    `room` is the seed of what stands around.
+    """
     station, camera = station or ur5e(), camera_model(640, 480, 606.0)
     rng = np.random.default_rng([seed, calibration, 2])
     centre = station.configuration_rad(calibration)
@@ -103,17 +113,28 @@ def view_recording(
         ),
         station,
         rng,
+        sensor,
+        room,
     )
 
 
+def photograph_recording(
+    calibration: int, seed: int = 0, station: Station | None = None, samples: int = 10
+) -> Recording:
+    """The same without masks, noisier, in a room whose clutter and colours are each calibration's own."""
+    room = int(np.random.default_rng([seed, calibration, 3]).integers(1, 2**31))
+    drawn = view_recording(calibration, seed, station, samples, sensor=_PHOTOGRAPH, room=room)
+    return replace(drawn, name=f"lab_photographs_{calibration:02d}", masks=None)
+
+
 def with_pictures(
-    recording: Recording, station: Station, rng: np.random.Generator, sensor: Sensor = _SENSOR
+    recording: Recording, station: Station, rng: np.random.Generator, sensor: Sensor = _SENSOR, room: int = 0
 ) -> Recording:
     """The recording with a picture and a mask of the arm for each of its samples, seen from its truth."""
     assert recording.camera is not None
     assert recording.joints_rad is not None
     assert recording.truth_parent_T_camera is not None
-    eye = Eye(station.scene(), recording.camera, sensor)
+    eye = Eye(station.scene(room=room), recording.camera, sensor)
     images, masks = [], []
     try:
         for joints in recording.joints_rad:

@@ -13,7 +13,8 @@ from numpy.typing import ArrayLike
 
 from hecbench import se3
 from hecbench.errors import InputError
-from hecbench.robots.model import Motion, RobotModel, load_robot
+from hecbench.robots.joints import Motion
+from hecbench.robots.model import RobotModel, load_robot
 from hecbench.se3 import Array
 
 _ROUNDS = 60

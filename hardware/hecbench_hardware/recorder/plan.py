@@ -18,7 +18,7 @@ from hecbench_hardware.limits import Limits
 from hecbench_hardware.motions import JointMotion, motion_time_s
 
 _TIME_SCALE = 50.0
-_PATIENCE_S = 2.0
+_PATIENCE_S = 5.0
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def dry_run(arm: Arm, plan: Recording, start: Array, limits: Limits) -> list[Pla
     steps, driven = check_plan(arm, plan, start, limits), []
     with SimulatedController(model=arm.name, time_scale=_TIME_SCALE) as controller:
         controller.fault("place " + " ".join(map(str, start.tolist())))
-        patient = Supervision(max_age_s=_PATIENCE_S)
+        patient = Supervision(max_age_s=_PATIENCE_S, late_s=_PATIENCE_S, leniency=_PATIENCE_S)
         with UrRobot(controller.host, arm, limits=limits, supervision=patient) as robot:
             robot.enable()
             for step in steps:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
+from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import DeviceSpec, Kind, SuiteSpec
 
-MARKERS, VIEWS = "markers", "views"
+MARKERS, VIEWS, PHOTOGRAPHS = "markers", "views", "photographs"
 
 
 def open_lab(options: Mapping[str, str]) -> Any:
@@ -23,8 +24,12 @@ def make(level: str, index: int, seed: int) -> Any:
     """One recording of the suite, drawn now."""
     from hecbench_hardware.lab import recordings
 
-    maker = recordings.marker_recording if level == MARKERS else recordings.view_recording
-    return maker(index, seed)
+    makers: dict[str, Callable[[int, int], Recording]] = {
+        MARKERS: recordings.marker_recording,
+        VIEWS: recordings.view_recording,
+        PHOTOGRAPHS: recordings.photograph_recording,
+    }
+    return makers[level](index, seed)
 
 
 @hookimpl
@@ -46,9 +51,9 @@ def hecbench_suites() -> Iterable[SuiteSpec]:
     """Marker calibrations and pictures of the arm."""
     yield SuiteSpec(
         name="lab",
-        summary="drawn in the virtual lab: 10 poses with a tag on the flange, or 10 configurations with masks",
+        summary="drawn in the virtual lab: 10 poses with a tag, or 10 configurations with masks or without",
         imports=("mujoco",),
-        levels=(MARKERS, VIEWS),
+        levels=(MARKERS, VIEWS, PHOTOGRAPHS),
         default_samples=18,
         make=make,
     )

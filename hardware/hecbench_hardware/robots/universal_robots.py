@@ -13,7 +13,7 @@ from hecbench.specs import DeviceSpec, Kind
 from hecbench_hardware.kinematics import ARMS, UrArm
 from hecbench_hardware.options import number, text
 
-_COMMON = ("limits", "speed_slider", "max_age_s", "max_force_n")
+_COMMON = ("limits", "speed_slider", "max_age_s", "max_force_n", "leniency")
 
 
 def _settings(options: Mapping[str, str]) -> dict[str, Any]:
@@ -24,6 +24,7 @@ def _settings(options: Mapping[str, str]) -> dict[str, Any]:
     supervision = Supervision(
         max_age_s=number(options, "max_age_s", usual.max_age_s),
         max_force_n=number(options, "max_force_n", usual.max_force_n),
+        leniency=number(options, "leniency", usual.leniency),
     )
     slider = number(options, "speed_slider", 1.0) if "speed_slider" in options else None
     if slider is not None and not 0 < slider <= 1:

@@ -43,7 +43,9 @@ class Control:
         self._fault: DeviceFault | None = None
         self._stopping = threading.Event()
         self._motion = threading.Lock()
-        self.worker = Worker("control", dashboard.host, patience_s=supervision.patience_s)
+        self.worker = Worker(
+            "control", dashboard.host, patience_s=supervision.patience_s, leniency=supervision.leniency
+        )
         try:
             self.worker.ready()
         except (WorkerGone, HecbenchError) as error:

@@ -14,7 +14,7 @@ from typing import Any
 from hecbench.errors import HecbenchError
 from hecbench_hardware.ur import worker
 
-_START_S = worker.CONNECT_S + 5.0
+_START_S = 5.0
 _GRACE_S = 0.2
 """How much longer than the worker's own deadline the parent waits before it ends the worker."""
 
@@ -26,8 +26,9 @@ class WorkerGone(Exception):
 class Worker:
     """One worker process. Its death is noticed at the next use, and `end` always leaves none behind."""
 
-    def __init__(self, role: str, host: str, *, patience_s: float = 0.0) -> None:
-        """Start the process; `ready` must follow. `patience_s` is that of `worker.Control` with the pulse."""
+    def __init__(self, role: str, host: str, *, patience_s: float = 0.0, leniency: float = 1.0) -> None:
+        """Start the process; `ready` must follow. `patience_s` and `leniency` are those of the supervision."""
+        self._leniency = leniency
         ours, theirs = socket.socketpair()
         with theirs, tempfile.TemporaryFile() as shared:
             shared.truncate(worker.Pulse.SIZE)
@@ -35,7 +36,7 @@ class Worker:
             descriptors = [theirs.fileno(), shared.fileno()]
             command = [sys.executable, "-P", str(Path(worker.__file__)), role, host]
             self._process = subprocess.Popen(
-                [*command, *map(str, descriptors), str(patience_s)],
+                [*command, *map(str, descriptors), str(patience_s), str(leniency)],
                 pass_fds=descriptors,
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,
@@ -63,7 +64,7 @@ class Worker:
             HecbenchError: It was refused, in its own words.
         """
         try:
-            if not self.connection.poll(_START_S):
+            if not self.connection.poll((_START_S + worker.CONNECT_S) * self._leniency):
                 raise EOFError
             refusal = self.connection.recv()
         except (EOFError, OSError):
@@ -74,12 +75,13 @@ class Worker:
             raise HecbenchError(refusal)
 
     def request(self, name: str, *args: object, deadline_s: float = worker.CALL_S) -> Any:
-        """Ask for one method and wait for its result, at most `deadline_s` and a little.
+        """Ask for one method and wait for its result, at most `deadline_s` times the leniency and a little.
 
         Raises:
             WorkerGone: The worker ended, or did not answer and was ended.
             HecbenchError: The client refused, in its own words.
         """
+        deadline_s *= self._leniency
         with self._lock:
             self._number += 1
             try:
@@ -100,7 +102,7 @@ class Worker:
         """Let the worker stop the arm and go; ends it when it does not."""
         try:
             self.connection.send(None)
-            self._process.wait(worker.LEAVE_S + _GRACE_S)
+            self._process.wait(worker.LEAVE_S * self._leniency + _GRACE_S)
         except (OSError, subprocess.TimeoutExpired):
             pass
         self.end()

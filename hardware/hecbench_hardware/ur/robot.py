@@ -62,7 +62,7 @@ class UrRobot:
         self.host, self.arm = host, arm
         self.supervision = supervision or Supervision()
         probe(host)
-        self._dashboard = Dashboard(host)
+        self._dashboard = Dashboard(host, self.supervision.leniency)
         self.simulated = self._dashboard.is_simulated()
         if not self.simulated:
             self.supervision.refuse_blind()

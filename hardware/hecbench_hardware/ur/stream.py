@@ -32,8 +32,9 @@ _SAFETY = {
 _LINK = (Fault.LINK_LOST, Fault.STALE)
 
 
-MOST_AGE_S, MOST_FORCE_N = 1.0, 150.0
-"""A real arm at its top speed covers half a metre in so long; above this force its controller stops by itself."""
+_CONNECTS = 3
+MOST = {"max_age_s": 1.0, "max_force_n": 150.0, "leniency": 10.0}
+"""For a real arm: at top speed it covers half a metre in a second, and above 150 N its controller stops by itself."""
 LAG_S = 0.1
 """How long a state may wait until this process judges it."""
 
@@ -48,10 +49,12 @@ class Supervision:
     """Norm of the tool force."""
     late_s: float = 1.0
     """Past its expected time a motion counts as late."""
+    leniency: float = 1.0
+    """Times the usual time for an answer of the controller and its clients; more for a busy machine."""
 
     def __post_init__(self) -> None:
         """Refuse what would stop the arm always."""
-        for name in ("max_age_s", "max_force_n", "late_s"):
+        for name in ("max_age_s", "max_force_n", "late_s", "leniency"):
             if not getattr(self, name) > 0:
                 raise InputError(f"{name}={getattr(self, name)} must be above 0")
 
@@ -62,7 +65,7 @@ class Supervision:
 
     def refuse_blind(self) -> None:
         """Raise an `InputError` for what a real arm may not be driven with."""
-        for name, most in (("max_age_s", MOST_AGE_S), ("max_force_n", MOST_FORCE_N)):
+        for name, most in MOST.items():
             if getattr(self, name) > most:
                 raise InputError(
                     f"{name}={getattr(self, name)} is above the most allowed for a real arm, {most}"
@@ -140,14 +143,7 @@ class StateStream:
         """
         self._device = f"robot {host}"
         self._supervision = supervision
-        self._worker = Worker("receive", host)
-        try:
-            self._worker.ready()
-            content = self._worker.connection.recv_bytes()
-        except (WorkerGone, HecbenchError, EOFError, OSError) as error:
-            self._worker.end()
-            raise DeviceFault(Fault.LINK_LOST, self._device, f"no state stream ({error})") from None
-        self.latest = Sample.unpack(content)
+        self._worker, self.latest = self._connected(host)
         self.fault: DeviceFault | None = None
         self._changed_s = self.latest.arrived_s
         self._news = threading.Condition()
@@ -156,6 +152,22 @@ class StateStream:
         self._closing = False
         self._thread = threading.Thread(target=self._read, name=f"{host} supervisor", daemon=True)
         self._thread.start()
+
+    def _connected(self, host: str) -> tuple[Worker, Sample]:
+        """A worker and its first sample; the client can crash when a slow controller lets it wait for that one."""
+        detail = ""
+        for _ in range(_CONNECTS):
+            worker = Worker("receive", host, leniency=self._supervision.leniency)
+            try:
+                worker.ready()
+                return worker, Sample.unpack(worker.connection.recv_bytes())
+            except (EOFError, OSError):
+                detail = "the client ended before the first state"
+                worker.end()
+            except (WorkerGone, HecbenchError) as error:
+                detail = str(error)
+                break
+        raise DeviceFault(Fault.LINK_LOST, self._device, f"no state stream, {detail}")
 
     @property
     def pid(self) -> int:

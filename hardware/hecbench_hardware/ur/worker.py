@@ -182,14 +182,14 @@ CLIENTS: dict[str, type[Control] | type[Outputs]] = {"control": Control, "output
 
 
 def serve(
-    role: str, host: str, connection: Connection, pulse: Pulse, patience_s: float
+    role: str, host: str, connection: Connection, pulse: Pulse, patience_s: float, leniency: float
 ) -> Control | Outputs | None:
     """Answer requests ``(number, method, args, deadline_s)`` until the parent says None or is gone; then leave.
 
     Returns the client, so that its destructor does not run; None when it did not connect.
     """
     try:
-        with ends_after(CONNECT_S):
+        with ends_after(CONNECT_S * leniency):
             client = CLIENTS[role](host, pulse, patience_s)
     except RuntimeError as error:
         connection.send(str(error))
@@ -199,7 +199,7 @@ def serve(
     try:
         while True:
             if time.monotonic() - tended > TEND_S:
-                with ends_after(CALL_S):
+                with ends_after(CALL_S * leniency):
                     client.tend()
                 tended = time.monotonic()
             if not connection.poll(TEND_S):
@@ -211,7 +211,7 @@ def serve(
             connection.send((number, *_answer(client, *call)))
     except (EOFError, OSError):
         pass
-    with ends_after(LEAVE_S):
+    with ends_after(LEAVE_S * leniency):
         client.leave()
     return client
 
@@ -226,12 +226,12 @@ def _answer(
         return False, str(error)
 
 
-def receive(host: str, connection: Connection) -> Any:
+def receive(host: str, connection: Connection, leniency: float) -> Any:
     """Send a packed sample `STREAM_HZ` times a second until the parent is gone; returns as `serve` does."""
     import rtde_receive
 
     try:
-        with ends_after(CONNECT_S):
+        with ends_after(CONNECT_S * leniency):
             client = rtde_receive.RTDEReceiveInterface(host, STREAM_HZ, VARIABLES)
     except RuntimeError as error:
         connection.send(str(error))
@@ -265,14 +265,14 @@ def _sample(client: Any) -> bytes:
     )
 
 
-def main(role: str, host: str, descriptor: str, shared: str, patience_s: str) -> None:
+def main(role: str, host: str, descriptor: str, shared: str, patience_s: str, leniency: str) -> None:
     """Serve one role; leave without the library's destructors, which wait, or abort when the link is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with Connection(int(descriptor)) as connection:
         if role == "receive":
-            client = receive(host, connection)
+            client = receive(host, connection, float(leniency))
         else:
-            client = serve(role, host, connection, Pulse(int(shared)), float(patience_s))
+            client = serve(role, host, connection, Pulse(int(shared)), float(patience_s), float(leniency))
         os._exit(client is None)
 
 

@@ -30,7 +30,7 @@ def held_out(
     solve: Callable[[Recording], Estimate],
     rng: np.random.Generator,
 ) -> Mapping[str, Any]:
-    """Prediction of left-out samples, 5-fold by sample, rms with its bootstrap interval, and the median.
+    """Prediction of left-out samples, 5-fold by sample: rms with its bootstrap interval, median, and each sample's.
 
     X is the solver's on the training folds. The ruler itself refits Y = carrier_T_target there with the raw
     robot poses, identically for every solver, and predicts ``inverse(X) @ H @ Y`` for the left-out samples. A
@@ -42,7 +42,8 @@ def held_out(
     usable = np.flatnonzero(
         np.isfinite(hand).all((1, 2)) & np.isfinite(recording.camera_T_target).all((1, 2))
     )
-    residuals: list[Array] = []
+    residuals: dict[str, Array] = {}
+    answers: list[Array] = []
     failed = 0
     folds = np.array_split(rng.permutation(usable), min(FOLDS, len(usable)))
     for fold in folds:
@@ -52,20 +53,30 @@ def held_out(
             failed += 1
             continue
         assert fitted.parent_T_camera is not None
+        answers.append(fitted.parent_T_camera)
         seen_by = _seen_by(fitted.camera or recording.camera, recording)
         carrier_T_target = refit_target(fitted.parent_T_camera, seen_by.subset(training))
-        residuals += [_residuals(fitted.parent_T_camera, carrier_T_target, seen_by, i) for i in fold.tolist()]
+        for i in fold.tolist():
+            off = _residuals(fitted.parent_T_camera, carrier_T_target, seen_by, i)
+            residuals[recording.sample_ids[i]] = off
     found: dict[str, Any] = {"folds": len(folds), "failed_folds": failed, "samples": len(residuals)}
-    for name, values in zip(
-        ("reprojection_px", "target_mm", "target_deg"), np.array(residuals).T, strict=False
-    ):
+    if _solved_again(answers, estimate):
+        found["fold_answers"] = [answer.tolist() for answer in answers]
+    columns = np.array(list(residuals.values())).T
+    for name, values in zip(("reprojection_px", "target_mm", "target_deg"), columns, strict=False):
         if np.isfinite(values).all():
             rms = statistics.bootstrap(values, statistics.root_mean_square)
             found[name] = rms.value
             if np.isfinite(rms.low):
                 found[f"{name}_interval"] = [rms.low, rms.high]
             found[f"{name}_median"] = float(np.median(values))
+            found[f"{name}_by_sample"] = dict(zip(residuals, values.tolist(), strict=True))
     return found
+
+
+def _solved_again(answers: list[Array], estimate: Estimate) -> bool:
+    """Whether the folds were solved on their own, so that their answers show how much the samples decide."""
+    return any(not np.array_equal(answer, estimate.parent_T_camera) for answer in answers)  # type: ignore[arg-type]
 
 
 def _seen_by(camera: CameraModel | None, recording: Recording) -> Recording:

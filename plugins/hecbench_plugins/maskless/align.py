@@ -24,7 +24,6 @@ from hecbench_plugins.views import scene_background
 from hecbench_plugins.views.canvas import Canvas, Images
 
 Array = NDArray[np.float64]
-Bits = NDArray[np.bool_]
 
 HALF_LINE = 8
 """Samples on each side of the contour."""

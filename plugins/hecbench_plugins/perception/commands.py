@@ -2,15 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
 
 import click
 
 from hecbench.errors import HecbenchError, InputError
+from hecbench_plugins.translation.plan import Method
 
 _FOLDER = click.Path(path_type=Path, file_okay=False)
 _NEEDED = ("torch", "safetensors", "onnx")
+
+
+def _require_torch() -> None:
+    missing = [name for name in _NEEDED if find_spec(name) is None]
+    if missing:
+        raise InputError(f"training needs {' and '.join(missing)}: pip install 'hecbench[torch]'")
 
 
 @click.group()
@@ -49,9 +58,7 @@ def perception(
 
     The run needs no data. It may be stopped at any moment: the same command goes on from its last checkpoint.
     """
-    missing = [name for name in _NEEDED if find_spec(name) is None]
-    if missing:
-        raise InputError(f"training needs {' and '.join(missing)}: pip install 'hecbench[torch]'")
+    _require_torch()
     from hecbench_plugins.perception.plan import Plan
 
     plan = Plan(
@@ -70,13 +77,52 @@ def perception(
     from hecbench_plugins.perception.training import Training
 
     training = Training(plan, click.echo)
-    try:
+    with _room_on_disk(out):
         training.run()
+        from hecbench_plugins.perception.product import write_model
+
+        click.echo(f"{write_model(training)}: the model, its card and its curve")
+
+
+@train.command()
+@click.option("--method", required=True, type=click.Choice([str(method) for method in Method]))
+@click.option(
+    "--robot", "robots", multiple=True, required=True, help="A known robot or a URDF file; repeatable."
+)
+@click.option("--out", required=True, type=_FOLDER, help="Folder of the run; a run found there goes on.")
+@click.option(
+    "--steps", default=588_000, show_default=True, help="Pictures; the default is 400 epochs of 1470."
+)
+@click.option("--size", default=256, show_default=True, help="Side of the pictures, px; 64 for a processor.")
+@click.option("--seed", default=0, show_default=True)
+@click.option("--threads", default=1, show_default=True, help="Of the processor.")
+def translation(
+    method: str, robots: tuple[str, ...], out: Path, steps: int, size: int, seed: int, threads: int
+) -> None:
+    """Train a translator of the paper on drawn pictures, and write it as OUT/model.
+
+    The robots of lit, shadowed and degraded pictures are cut out and translated into flat colours. The run may be
+    stopped at any moment: the same command goes on from its last checkpoint.
+    """
+    _require_torch()
+    from hecbench_plugins.translation.plan import Plan
+
+    plan = Plan(Method(method), robots, out, steps, seed=seed, size=size, threads=threads)
+    plan.check()
+    from hecbench_plugins.translation.training import Training, write_model
+
+    training = Training(plan, click.echo)
+    with _room_on_disk(out):
+        training.run()
+        click.echo(f"{write_model(training)}: the translator and its card")
+
+
+@contextmanager
+def _room_on_disk(folder: Path) -> Iterator[None]:
+    """Say in one line that a folder cannot be written."""
+    try:
+        yield
     except OSError as error:
         raise HecbenchError(
-            f"{out}: cannot be written ({error.strerror}); make room and start again"
+            f"{folder}: cannot be written ({error.strerror}); make room and start again"
         ) from error
-
-    from hecbench_plugins.perception.product import write_model
-
-    click.echo(f"{write_model(training)}: the model, its card and its curve")

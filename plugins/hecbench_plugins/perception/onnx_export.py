@@ -38,22 +38,25 @@ def to_onnx(net: PerceptionNet) -> bytes:
     """The graph: `image` (1, 3, H, W) RGB in [0, 1] to `logits`, any H and W that are multiples of 32."""
     net = copy.deepcopy(net).cpu().float().eval()
     _fuse(net)
+    return graph_of(net, 2 * STRIDE, any_size=True)
+
+
+def graph_of(net: nn.Module, size: int, any_size: bool = False) -> bytes:
+    """A network as an ONNX graph: `image` (1, 3, H, W) to `logits`, for pictures of `size` px or of any."""
     content = io.BytesIO()
     sizes = {2: "height", 3: "width"}
     with warnings.catch_warnings():
-        warnings.simplefilter(
-            "ignore"
-        )  # this exporter is the one that needs no further package, and says it is old
+        warnings.simplefilter("ignore")  # this exporter is the one that writes any size, and says it is old
         torch.onnx.export(
-            net,
-            (torch.zeros(1, 3, 2 * STRIDE, 2 * STRIDE),),
+            net.cpu().eval(),
+            (torch.zeros(1, 3, size, size),),
             content,  # type: ignore[arg-type]
             dynamo=False,
             input_names=["image"],
             output_names=["logits"],
-            dynamic_axes={"image": sizes, "logits": sizes},
+            dynamic_axes={"image": sizes, "logits": sizes} if any_size else None,
             opset_version=_OPSET,
-            do_constant_folding=False,
+            do_constant_folding=not any_size,  # folded halves would be floats on disk,
         )
     return content.getvalue()
 

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hecbench.errors import InputError
-from hecbench.robots.model import Motion, RobotModel
+from hecbench.robots.joints import Motion
+from hecbench.robots.model import RobotModel
 
 Array = NDArray[np.float64]
 

@@ -26,10 +26,12 @@ class Learned:
     def __call__(self, recording: Recording) -> Recording:
         """The recording with a mask for every image; an empty one, and a note, where the network sees no robot.
 
+        The network knows arms without tools: the robot of the recording becomes that.
+
         Raises:
             Refusal: there are no images, no network for the robot, or no robot in any image.
         """
-        from hecbench_plugins.perception.choice import perceiver_for
+        from hecbench_plugins.perception.choice import perceiver_for, robot_of
 
         samples = [i for i, source in enumerate(recording.images or ()) if source is not None]
         if not samples:
@@ -47,13 +49,17 @@ class Learned:
                 f"{recording.name}: no robot is seen in any of the {len(samples)} images: another robot, or a camera"
                 " that looks elsewhere?"
             )
-        notes = recording.notes
+        notes, robot = recording.notes, recording.robot
+        assert robot is not None
+        if robot.model is not None and (arm := robot_of(recording)) != robot.model:
+            robot = replace(robot, model=arm)
+            notes = (*notes, f"masks: of the arm without its tool; the robot is taken as {arm}")
         if empty:
             notes = (
                 *notes,
                 f"masks: no robot is seen in {len(empty)} of {len(samples)} images: {', '.join(empty)}",
             )
-        return replace(recording, masks=tuple(masks), notes=notes)
+        return replace(recording, masks=tuple(masks), robot=robot, notes=notes)
 
 
 @hookimpl

@@ -86,7 +86,15 @@ class Bundle:
             return answer(problem, solution)
         fx, fy, cx, cy = solution.state.parameters[:4]
         K, distortion = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]]), solution.state.parameters[4:]
-        found = answer(problem, solution, K=K.tolist(), distortion=distortion.tolist())
+        sigmas = np.sqrt(np.diagonal(solution.covariance)[-len(problem.parameters) :])
+        found = answer(
+            problem,
+            solution,
+            K=K.tolist(),
+            distortion=distortion.tolist(),
+            intrinsics_sigma=sigmas.tolist(),
+            intrinsics_prior_sigma=problem.parameter_sigmas.tolist(),
+        )
         return replace(found, camera=replace(camera, K=K, distortion=distortion))
 
     def _known(self) -> tuple[bool, bool, bool]:

@@ -1,22 +1,8 @@
 """Connections to the simulated controller, byte by byte."""
 
 import socket
-import time
 
 import pytest
-
-
-@pytest.fixture
-def wait_until():
-    """Waits for a condition, patient on a busy machine."""
-
-    def wait(condition, timeout_s=20.0):
-        deadline = time.monotonic() + timeout_s
-        while not condition():
-            assert time.monotonic() < deadline, "it did not happen in time"
-            time.sleep(0.005)
-
-    return wait
 
 
 @pytest.fixture

@@ -255,6 +255,7 @@ def test_servo_and_speed_of_joints(run, runner):
 def test_outputs_registers_and_settings(run, runner):
     run("""
  set_digital_out(3, True)
+ digital_out[5] = True
  set_configurable_digital_out(1, True)
  set_tool_digital_out(0, True)
  set_standard_analog_out(1, 0.25)
@@ -269,7 +270,7 @@ def test_outputs_registers_and_settings(run, runner):
    textmsg(get_target_payload_cog())
  end""")
     io = runner.arm.io
-    assert io.digital_outputs == 1 << 3 | 1 << 9 | 1 << 16
+    assert io.digital_outputs == 1 << 3 | 1 << 5 | 1 << 9 | 1 << 16
     assert io.analog_outputs == [0.0, 0.25]
     assert io.tool_voltage == 24
     assert io.outputs.bits[70]

@@ -135,6 +135,20 @@ def test_vs060_reaches_every_place(shared):
             assert np.allclose(station.arm.forward(found[0]), flange, atol=1e-6)
 
 
+def test_photographs_have_no_masks_and_rooms_of_their_own(drawable):
+    first, second = (recordings.photograph_recording(calibration, samples=1) for calibration in (0, 1))
+    assert first.masks is None
+    assert first.initial_parent_T_camera is not None
+    np.testing.assert_array_equal(first.image(0), recordings.photograph_recording(0, samples=1).image(0))
+    view = recordings.view_recording(0, samples=1)
+    np.testing.assert_array_equal(first.truth_parent_T_camera, view.truth_parent_T_camera)
+    away = ~view.mask(0)
+    assert (
+        np.abs(first.image(0)[away].astype(int) - view.image(0)[away]).mean() > 3
+    )  # other clutter, more noise
+    assert not np.array_equal(first.image(0), second.image(0))
+
+
 def test_view_recording_has_pictures_masks_and_truth(drawable, station):
     recording = recordings.view_recording(0, samples=2)
     assert recording.image(0).shape == (480, 640, 3)

@@ -91,7 +91,6 @@ def test_mimic_joints_follow_their_leader():
         pad = model.link_index(f"gripper/{side}_inner_finger_pad")
         assert se3.rotation_error_rad(open_[pad], closed[pad]) < 1e-6  # the pads stay parallel
         assert abs(closed[pad, 0, 3]) < abs(open_[pad, 0, 3]) - 0.03  # and close by 85 mm in all
-    assert model.moved_by("gripper/finger_joint")[model.link_index("gripper/left_inner_finger")]
 
 
 def test_colours_and_faces_of_the_known_arms(ur5e):

@@ -156,6 +156,13 @@ def test_an_interrupted_run_is_finished_by_resume(tmp_path):
     assert comparable(resumed) == comparable(whole)
 
 
+def test_resume_runs_another_seed_again(tmp_path):
+    for seed, expected in ((0, 4), (0, 0), (1, 4), (0, 0)):
+        ran = []
+        runner.run(tasks(2), Options(seed=seed), out=tmp_path / "o", resume=True, on_result=ran.extend)
+        assert len(ran) == expected
+
+
 def test_resume_runs_a_changed_recording_again(tmp_path):
     folder = tmp_path / "cell"
     for seed, expected in ((0, 1), (0, 0), (1, 1)):

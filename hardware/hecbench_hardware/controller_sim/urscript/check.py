@@ -9,15 +9,17 @@ from typing import Any
 from hecbench_hardware.controller_sim.arm import ScriptError
 from hecbench_hardware.controller_sim.urscript.syntax import Call, Function, Run, Statement
 
+UNKNOWN = "is not defined by the program, and not simulated"
 
-def check_calls(body: list[Statement], known: Collection[str]) -> None:
-    """Raise `ScriptError` for the first call of a function that neither the program nor the controller has."""
+
+def check_calls(body: list[Statement], known: Collection[str], complaint: str = UNKNOWN) -> None:
+    """Raise `ScriptError` for the first call of a function that is neither the program's own nor known."""
     nodes = list(_nodes(body))
     own = {node.name for node in nodes if isinstance(node, Function)}
     for node in nodes:
         call = node.call if isinstance(node, Run) else node
         if isinstance(call, Call) and call.name not in own and call.name not in known:
-            error = ScriptError(f"'{call.name}' is not defined by the program, and not simulated")
+            error = ScriptError(f"'{call.name}' {complaint}")
             error.line = call.line
             raise error
 

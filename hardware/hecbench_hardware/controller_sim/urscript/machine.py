@@ -1,14 +1,14 @@
-"""Runs a URScript program: one generator per thread, a turn of each in every cycle of the controller."""
+"""Executes the statements of a URScript program."""
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from hecbench.se3 import Array
 from hecbench_hardware.controller_sim.arm import ScriptError
 from hecbench_hardware.controller_sim.urscript.functions import Builtin
+from hecbench_hardware.controller_sim.urscript.scheduler import Halted, Scheduler, Steps, Thread
 from hecbench_hardware.controller_sim.urscript.scope import Closure, Scope
 from hecbench_hardware.controller_sim.urscript.syntax import (
     Assign,
@@ -46,19 +46,12 @@ if TYPE_CHECKING:
     from hecbench_hardware.controller_sim.program import ProgramRunner
     from hecbench_hardware.controller_sim.urscript.sockets import Sockets
 
+_OLD_ARRAYS = {"digital_out": "set_digital_out", "analog_out": "set_analog_out"}
+"""Arrays by which programs of the first generation set outputs."""
 STRUCT = "struct"
 """The function that makes a struct of its keywords."""
-Steps = Generator[None, None, Any]
-"""Runs for any number of cycles, then has a result."""
-
-_STATEMENTS_PER_CYCLE = 400
-"""What a thread may do in one cycle; the rest waits for the next, as on a processor that is busy."""
-_CALL_DEPTH, _THREADS = 40, 64
+_CALL_DEPTH = 40
 _BREAK, _CONTINUE = object(), object()
-
-
-class Halted(Exception):
-    """The program asked to end."""
 
 
 @dataclass
@@ -66,72 +59,18 @@ class _Returned:
     value: Value
 
 
-@dataclass(eq=False)
-class Thread:
-    """A running thread; equal only to itself, so never to the number 0."""
-
-    steps: Steps
-    line: int = 0
-    alive: bool = True
-    budget: int = _STATEMENTS_PER_CYCLE
-    depth: int = 0
-
-
-class Machine:
+class Machine(Scheduler):
     """One run of one program."""
 
     def __init__(self, runner: ProgramRunner, sockets: Sockets, library: dict[str, Builtin]) -> None:
-        self.runner, self.arm, self.sockets = runner, runner.arm, sockets
-        self._library = library
-        self._threads: list[Thread] = []
-        self.current: Thread | None = None
-        self._critical: Thread | None = None
+        super().__init__(runner, sockets)
+        self.arm, self._library = runner.arm, library
         self.waypoint: Array | None = None
         """Where the present or last motion goes, as a pose vector (6,)."""
 
     def run(self, body: list[Statement]) -> Steps:
-        """Execute a program to its end, one turn of every thread per cycle; it ends with its first thread."""
-        main = self._spawn(self._body(body, Scope()))
-        try:
-            while main.alive:
-                for thread in list(self._threads):
-                    if thread.alive and self._critical in (None, thread):
-                        self._turn(thread)
-                if main.alive:
-                    yield
-        except Halted:
-            pass
-        finally:
-            self.sockets.close()
-
-    def _turn(self, thread: Thread) -> None:
-        self.current, thread.budget = thread, _STATEMENTS_PER_CYCLE
-        try:
-            next(thread.steps)
-        except StopIteration:
-            self.kill(thread)
-        except ScriptError as error:
-            error.line = error.line or thread.line
-            raise
-        except RecursionError:
-            raise ScriptError("expressions too deeply nested") from None
-        self.runner.line = thread.line
-
-    def _spawn(self, steps: Steps) -> Thread:
-        self._threads = [thread for thread in self._threads if thread.alive]
-        if len(self._threads) >= _THREADS:
-            raise ScriptError(f"more than {_THREADS} threads")
-        thread = Thread(steps)
-        self._threads.append(thread)
-        return thread
-
-    def kill(self, thread: Thread) -> None:
-        """End a thread."""
-        thread.alive = False
-        if self._critical is thread:
-            self._critical = None
-        if thread is not self.current:
-            thread.steps.close()
+        """Execute a program to its end."""
+        return self.take_turns(self._body(body, Scope()))
 
     # statements
 
@@ -176,9 +115,9 @@ class Machine:
         if word == "halt":
             raise Halted
         if word == "enter_critical":
-            self._critical = thread
-        elif word == "exit_critical" and self._critical is thread:
-            self._critical = None
+            self.critical = thread
+        elif word == "exit_critical" and self.critical is thread:
+            self.critical = None
         return {"break": _BREAK, "continue": _CONTINUE}.get(word)
 
     def _if(self, statement: If, scope: Scope) -> Steps:
@@ -218,6 +157,10 @@ class Machine:
         if isinstance(target, Name):
             scope.assign(target.name, value, statement.scope)
             return
+        if isinstance(target, Item) and isinstance(target.target, Name) and target.target.name in _OLD_ARRAYS:
+            index = yield from self._values(target.indices, scope)
+            yield from self._library[_OLD_ARRAYS[target.target.name]].call(self, [*index, value], {})
+            return
         holder = yield from self._value(target.target, scope)
         if isinstance(target, Member):
             if not isinstance(holder, dict) or target.name not in holder:
@@ -256,7 +199,7 @@ class Machine:
             if not isinstance(holder, dict) or node.name not in holder:
                 raise ScriptError(f"{text_of(holder)} has no member '{node.name}'")
             return holder[node.name]
-        return self._spawn((yield from self._started(node, scope)))
+        return self.spawn((yield from self._started(node, scope)))
 
     def _values(self, nodes: list[Expression], scope: Scope) -> Steps:
         values = []

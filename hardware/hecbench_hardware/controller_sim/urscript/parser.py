@@ -24,7 +24,7 @@ from hecbench_hardware.controller_sim.urscript.syntax import (
     Unary,
     While,
 )
-from hecbench_hardware.controller_sim.urscript.tokens import Token, syntax_error, tokens
+from hecbench_hardware.controller_sim.urscript.tokens import KEYWORDS, Token, syntax_error, tokens
 
 _LEVELS = (
     ("or",),
@@ -98,7 +98,7 @@ class _Parser:
             if self._word.kind in ends or not self._word.kind:
                 break
             body.append(self._statement())
-            if self._word.kind not in ("newline", "", *ends):
+            if self._word.kind not in ("newline", "", "name", *KEYWORDS):
                 raise self._error("a new line expected")
         self._depth -= 1
         return body

@@ -40,7 +40,7 @@ KEYWORDS: Final = frozenset(
 )
 OPENERS: Final = frozenset({"def", "sec", "thread", "if", "while"})
 """Words that begin a block; `end` ends it."""
-_CONTINUED: Final = frozenset({"and", "or", "xor", "not", "+", "-", "*", "/", "%"})
+_CONTINUED: Final = frozenset({"and", "or", "xor", "not", "=", "+", "-", "*", "/", "%"})
 """Words after which a line goes on in the next."""
 _TOKEN = re.compile(
     r"""(?P<space>[ \t\r\f\v]+|\#[^\n]*)

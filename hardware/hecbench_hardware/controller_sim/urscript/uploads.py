@@ -9,7 +9,7 @@ from hecbench_hardware.controller_sim.channel import complete_lines
 from hecbench_hardware.controller_sim.control_script import MARK, ControlScript
 from hecbench_hardware.controller_sim.program import Program, ProgramRunner
 from hecbench_hardware.controller_sim.urscript.check import check_calls
-from hecbench_hardware.controller_sim.urscript.library import LIBRARY
+from hecbench_hardware.controller_sim.urscript.library import LIBRARY, motion
 from hecbench_hardware.controller_sim.urscript.machine import STRUCT, Machine
 from hecbench_hardware.controller_sim.urscript.parser import parse
 from hecbench_hardware.controller_sim.urscript.sockets import Sockets
@@ -76,11 +76,16 @@ def compiled(runner: ProgramRunner, text: str) -> tuple[Program, str, bool]:
     if MARK in text:
         return ControlScript(runner, text).run(), MARK.split()[1], False
     body = parse(text)
-    check_calls(body, {*LIBRARY, STRUCT})
+    known = {*LIBRARY, STRUCT}
+    check_calls(body, known)
     name, is_secondary = "<unnamed>", False
     if len(body) == 1 and isinstance(body[0], Function):
         main = body[0]
         name, is_secondary = main.name, main.word == "sec"
+        if is_secondary:
+            check_calls(
+                body, known - motion.FUNCTIONS.keys(), "takes time, which a secondary program must not"
+            )
         body = [main, Do(main.line, Call(main.line, name, [], {}))]
     machine = Machine(runner, Sockets(runner.gripper, runner.host), LIBRARY)
     return machine.run(body), name, is_secondary

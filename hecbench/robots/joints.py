@@ -1,0 +1,112 @@
+"""Joints of a robot: what moves, what follows, and what a position beyond the limits most likely means."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hecbench.errors import InputError
+
+Array = NDArray[np.float64]
+
+_HAIR = 0.005
+"""Of a joint's range: encoders and rounded limits stray by less; a wrong unit or order by far more."""
+_MOST_HAIR = 0.01
+"""rad or m: 0.6 deg, for joints of a large range."""
+
+
+class Motion(StrEnum):
+    """What a joint does with its position."""
+
+    FIXED = "fixed"
+    REVOLUTE = "revolute"
+    PRISMATIC = "prismatic"
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """One URDF joint. A mimic joint moves with `leader`: ``position = multiplier * leader + offset``."""
+
+    name: str
+    motion: Motion
+    parent: str
+    child: str
+    origin: Array
+    """parent_T_joint (4, 4) at position zero."""
+    axis: Array
+    """Unit axis (3,) in the joint frame."""
+    lower: float = -np.inf
+    upper: float = np.inf
+    leader: str | None = None
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+    @property
+    def hair(self) -> float:
+        """How far beyond its limits a position is still accepted, rad or m."""
+        span = self.upper - self.lower
+        return min(_HAIR * span, _MOST_HAIR) if np.isfinite(span) else _MOST_HAIR
+
+    def is_beyond(self, positions: Array) -> NDArray[np.bool_]:
+        """Which positions are outside the limits, by however little."""
+        return np.asarray((positions < self.lower) | (positions > self.upper))
+
+    def refuses(self, positions: Array) -> NDArray[np.bool_]:
+        """Which positions are outside the limits by more than a hair."""
+        return np.asarray((positions < self.lower - self.hair) | (positions > self.upper + self.hair))
+
+    def reason(self, position: float) -> str:
+        """Why a position is refused, and the cure."""
+        limits = f"{self.lower:.4g} to {self.upper:.4g}"
+        if self.lower > self.upper:
+            return f"the URDF's limits of {self.name} are reversed ({limits}): swap lower and upper in its <limit>"
+        if self.lower == self.upper:
+            return (
+                f"the URDF limits {self.name} to {self.lower:g}..{self.upper:g}, but it is at {position:.4g}: "
+                "correct its <limit>"
+            )
+        outside = f"{self.name} at {position:.4g} is outside its limits {limits}"
+        small = np.deg2rad(position) if self.motion is Motion.REVOLUTE else position / 1000
+        if not self.refuses(np.array(small)):
+            units = (
+                "degrees instead of radians"
+                if self.motion is Motion.REVOLUTE
+                else "millimetres instead of metres"
+            )
+            return f"{outside}: {units}, or another joint order?"
+        return f"{outside}: another joint order, or a wrong <limit> in the URDF?"
+
+
+def resolved(joints: tuple[Joint, ...], path: Path, notes: list[str]) -> tuple[Joint, ...]:
+    """The joints with chains of mimic joints led by the one at their head.
+
+    Raises:
+        InputError: a mimic joint follows one that is not there, or itself.
+    """
+    by_name = {joint.name: joint for joint in joints}
+    done = []
+    for joint in joints:
+        head, multiplier, offset = joint, 1.0, 0.0
+        seen = {joint.name}
+        while head.leader is not None:
+            if head.leader not in by_name:
+                raise InputError(
+                    f"{path}: joint '{head.name}' mimics '{head.leader}', which is not there: correct <mimic joint=...>"
+                )
+            offset += multiplier * head.offset
+            multiplier *= head.multiplier
+            head = by_name[head.leader]
+            if head.name in seen:
+                raise InputError(f"{path}: joint '{joint.name}' mimics itself: correct <mimic joint=...>")
+            seen.add(head.name)
+        if head is joint:
+            done.append(joint)
+            continue
+        if head.motion is Motion.FIXED:
+            notes.append(f"joint '{joint.name}' mimics '{head.name}', which is fixed: it stays at {offset:g}")
+        done.append(replace(joint, leader=head.name, multiplier=multiplier, offset=offset))
+    return tuple(done)

@@ -1,0 +1,1 @@
+"""Image-to-image translation by adversarial networks, as published: networks, losses, training, running by OpenCV."""
