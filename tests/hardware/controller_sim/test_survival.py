@@ -36,6 +36,7 @@ ODD = [
     (30001, b'def f():\n s = "x"\n while True:\n  s = str_cat(s, s)\n end\nend\n'),
     (30001, b"def f():\n x = 2\n while True:\n  x = x * x\n end\nend\n"),
     (30001, b"def f():\n while True:\n end\nend\n"),
+    (30001, b"def f():\n enter_critical\n while True:\n end\nend\n"),
     (30001, b"def f():\n while True:\n  run g()\n end\nend\ndef g():\n sleep(9)\nend\n"),
     (30003, b"speedl([1e308, 1e308, 0, 0, 0, 0], 1e308)\n"),
     (30003, b"movel(p[1e308, 0, 0, 0, 0, 0])\n"),

@@ -1,6 +1,7 @@
 """The store: append-only, exclusive, and readable after any kind of death."""
 
 import multiprocessing
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -108,3 +109,10 @@ def test_bad_places(tmp_path):
         write(tmp_path / "file" / "below", estimates(1))
     with pytest.raises(InputError, match=r"estimates.jsonl"):
         store.read(tmp_path / "nowhere")
+
+
+def test_results_of_two_seeds_are_two_results(tmp_path):
+    first, second = estimates(1)[0], estimates(1)[0]
+    second = replace(second, provenance={**second.provenance, "seed": 1})
+    write(tmp_path, [first, second])
+    assert len(store.read(tmp_path).estimates) == 2

@@ -88,8 +88,7 @@ class Machine(Scheduler):
         thread = self.current
         assert thread
         thread.line = statement.line
-        thread.budget -= 1
-        if thread.budget < 0:
+        if self.spend(thread):
             yield
         if isinstance(statement, Assign):
             value = yield from self._value(statement.value, scope)
@@ -135,8 +134,7 @@ class Machine(Scheduler):
                 break
             if isinstance(signal, _Returned):
                 return signal
-            thread.budget -= 1
-            if thread.budget < 0:
+            if self.spend(thread):
                 yield
         return None
 

@@ -85,6 +85,20 @@ def truth(value: Value, what: str = "a condition") -> bool:
     return value
 
 
+def text(value: Value, what: str = "it") -> str:
+    """A text, or an error."""
+    if not isinstance(value, str):
+        raise ScriptError(f"{what} must be a text, not {text_of(value)}")
+    return value
+
+
+def whole(value: Value, what: str = "it") -> int:
+    """A whole number, or an error."""
+    if not isfinite(number(value, what)) or int(value) != value:
+        raise ScriptError(f"{what} must be a whole number, not {text_of(value)}")
+    return int(value)
+
+
 def text_of(value: Value) -> str:
     """As the controller writes it."""
     if isinstance(value, Pose):
@@ -113,15 +127,7 @@ def bounded(value: Value) -> Value:
     return value
 
 
-def _divide(a: float, b: float) -> float:
-    if b == 0:
-        raise ScriptError("division by zero")
-    return a / b
-
-
 def _modulo(a: float, b: float) -> float:
-    if b == 0:
-        raise ScriptError("division by zero")
     return int(fmod(a, b)) if isinstance(a, int) and isinstance(b, int) else fmod(a, b)
 
 
@@ -129,7 +135,7 @@ _ARITHMETIC: Final[dict[str, Callable[[Any, Any], Any]]] = {
     "+": lambda a, b: a + b,
     "-": lambda a, b: a - b,
     "*": lambda a, b: a * b,
-    "/": _divide,
+    "/": lambda a, b: a / b,
     "%": _modulo,
 }
 _ORDER: Final[dict[str, Callable[[Any, Any], bool]]] = {
@@ -152,7 +158,10 @@ def combine(operator: str, a: Value, b: Value) -> Value:
             return _ORDER[operator](a, b)
         raise ScriptError(f"'{operator}' needs numbers, not {text_of(a)} and {text_of(b)}")
     if is_number(a) and is_number(b):
-        return bounded(_ARITHMETIC[operator](a, b))
+        try:
+            return bounded(_ARITHMETIC[operator](a, b))
+        except (ArithmeticError, ValueError) as error:
+            raise ScriptError(f"{text_of(a)} {operator} {text_of(b)}: {error}") from None
     if isinstance(a, str) and isinstance(b, str) and operator == "+":
         return bounded(a + b)
     return _combine_lists(operator, a, b)
@@ -172,10 +181,10 @@ def _combine_lists(operator: str, a: Value, b: Value) -> Value:
 
 def item_of(holder: Value, index: Value) -> Value:
     """`holder[index]`."""
-    whole = int(index) if isinstance(index, int | float) and not isinstance(index, bool) else -1
-    if not isinstance(holder, list) or whole != index or not 0 <= whole < len(holder):
-        raise ScriptError(f"{text_of(holder)} has no item {text_of(index)}")
-    return holder[whole]
+    at = whole(index, "an index")
+    if not isinstance(holder, list) or not 0 <= at < len(holder):
+        raise ScriptError(f"{text_of(holder)} has no item {at}")
+    return holder[at]
 
 
 def pose_from(items: list[Value]) -> Pose:
