@@ -100,6 +100,21 @@ def rtde_set_watchdog(
     m.runner.watchdog = Watchdog(variable_name, hertz, action, m.runner.wall_s)
 
 
+def set_pos(m: Machine, q: Value) -> None:
+    """Put the arm, which is a simulated one, to other joints at once."""
+    m.arm.move(vector(q, 6, "q"))
+
+
+def set_safety_mode_transition_hardness(m: Machine, type_: Value) -> None:
+    """How abruptly speed limits act, of which there are none here."""
+    number(type_, "type")
+
+
+def position_deviation_warning(m: Machine, enabled: Value, threshold: Value = 0.8) -> None:
+    """Warn of a deviation from the target, of which there is none here."""
+    truth(enabled, "enabled")
+
+
 def protective_stop(m: Machine) -> None:
     """Stop as after a collision."""
     m.arm.protective_stop("asked for by the program")
@@ -124,6 +139,9 @@ FUNCTIONS: Final = builtins(
     force_mode_set_damping,
     force_mode_set_gain_scaling,
     rtde_set_watchdog,
+    set_pos,
+    set_safety_mode_transition_hardness,
+    position_deviation_warning,
     protective_stop,
     powerdown,
 )
