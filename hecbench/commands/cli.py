@@ -19,6 +19,7 @@ import click
 from hecbench import __version__
 from hecbench.commands import choices, console
 from hecbench.commands.calibrate import calibrate
+from hecbench.commands.robot import robot
 from hecbench.commands.run import demo, run
 from hecbench.commands.solve import solve
 from hecbench.errors import HecbenchError, InputError
@@ -82,7 +83,7 @@ def cli() -> None:
     """Calibrate hand-eye rigs with every method, measure all by the same rulers, and report."""
 
 
-for _verb in (calibrate, demo, run, solve):
+for _verb in (calibrate, demo, robot, run, solve):
     cli.add_command(_verb)
 
 
@@ -93,11 +94,14 @@ def plugins(kind: str | None, as_json: bool) -> None:
     """List every plugin, also those that are missing something, broken or in conflict."""
     from hecbench import registry
     from hecbench.report.tables import Table
+    from hecbench.robots import packages
     from hecbench.specs import Kind
 
     if kind is not None and kind not in list(Kind):
         raise InputError(f"--kind {kind}: choose one of {', '.join(Kind)}")
     rows = [plugin.row() for plugin in registry.load().select(Kind(kind) if kind else None)]
+    if kind == Kind.ROBOT:
+        rows += [robot.row() for robot in (*packages.of_entry_points(), *packages.of_distributions())]
     if as_json:
         console.print_json(rows)
         return
@@ -150,9 +154,15 @@ def conformance(name: str, kind: str | None, as_json: bool) -> None:
 
 
 @cli.command()
+@click.option("--warm", is_flag=True, help="Compile now what the first calibration would have to wait for.")
 @choices.as_json
-def doctor(as_json: bool) -> None:
+def doctor(warm: bool, as_json: bool) -> None:
     """Say what is installed, what is missing and how to get it."""
+    if warm:
+        from hecbench.commands.warming import warm as warmed
+
+        for part in warmed():
+            console.say(f"{part.subject}: {part.seconds:.1f} s")
     from hecbench.commands import doctor as examination
     from hecbench.report.tables import Table
 
