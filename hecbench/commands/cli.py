@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from difflib import get_close_matches
 from importlib import metadata
 from pathlib import Path
 
@@ -37,6 +38,15 @@ class _Verbs(click.Group):
             return command
         found = list(metadata.entry_points(group=COMMAND_GROUP, name=cmd_name))
         return found[0].load() if found else None
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if self.get_command(ctx, args[0]) is None:
+            near = get_close_matches(args[0], self.list_commands(ctx), n=2)
+            hint = f", did you mean {' or '.join(near)}?" if near else ": see hecbench --help"
+            raise click.UsageError(f"no verb is called '{args[0]}'{hint}", ctx)
+        return super().resolve_command(ctx, args)
 
 
 def main() -> None:

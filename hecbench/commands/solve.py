@@ -25,7 +25,9 @@ if TYPE_CHECKING:
 @choices.unknown
 @click.option("--views", type=click.IntRange(min=1), help="Use this many samples, drawn with --seed.")
 @click.option(
-    "--init", type=choices.FILE, help="An estimate to start from instead of initial_parent_T_camera."
+    "--init",
+    metavar="START",
+    help="Start from an estimate, a 4x4 in JSON, 'x y z roll pitch yaw', or 'looking-at x y z'.",
 )
 @choices.held_out
 @choices.check
@@ -44,7 +46,7 @@ def solve(
     segmenter: str | None,
     unknown: tuple[str, ...],
     views: int | None,
-    init: Path | None,
+    init: str | None,
     held_out: bool | None,
     check: bool,
     timeout_s: float | None,
