@@ -19,6 +19,7 @@ import click
 from hecbench import __version__
 from hecbench.commands import choices, console
 from hecbench.commands.calibrate import calibrate
+from hecbench.commands.robot import robot
 from hecbench.commands.run import demo, run
 from hecbench.commands.solve import solve
 from hecbench.commands.view import view
@@ -83,7 +84,7 @@ def cli() -> None:
     """Calibrate hand-eye rigs with every method, measure all by the same rulers, and report."""
 
 
-for _verb in (calibrate, demo, run, solve, view):
+for _verb in (calibrate, demo, robot, run, solve, view):
     cli.add_command(_verb)
 
 
@@ -94,11 +95,14 @@ def plugins(kind: str | None, as_json: bool) -> None:
     """List every plugin, also those that are missing something, broken or in conflict."""
     from hecbench import registry
     from hecbench.report.tables import Table
+    from hecbench.robots import packages
     from hecbench.specs import Kind
 
     if kind is not None and kind not in list(Kind):
         raise InputError(f"--kind {kind}: choose one of {', '.join(Kind)}")
     rows = [plugin.row() for plugin in registry.load().select(Kind(kind) if kind else None)]
+    if kind == Kind.ROBOT:
+        rows += [robot.row() for robot in (*packages.of_entry_points(), *packages.of_distributions())]
     if as_json:
         console.print_json(rows)
         return

@@ -21,6 +21,7 @@ from hecbench.diagnose import (
     pairing,
     planar_ambiguity,
     pose_direction_or_mounting,
+    robot_model,
     rotation_diversity,
     sample_moving,
     target_scale,
@@ -32,6 +33,7 @@ from hecbench.recording import Recording
 
 _STEPS: tuple[Callable[[Examination], tuple[Finding | None, Examination]], ...] = (
     image_quality.examine,
+    robot_model.examine,
     joints_vs_pose.examine,
     sample_moving.examine,
     rotation_diversity.examine,

@@ -46,7 +46,7 @@ def referenced_files(mesh: Path) -> list[Path]:
         ]
         found = {*libraries, *(m.texture for path in libraries for m in of_mtl(path).values() if m.texture)}
     elif suffix == ".dae":
-        root = xml.parse(mesh_bytes(mesh), f"{mesh}: not a readable mesh")
+        root = xml.parse(mesh_bytes(mesh), f"{mesh}: not a readable mesh", mesh=True)
         found = {material.texture for material in of_collada(root, mesh).values() if material.texture}
     else:
         return []

@@ -77,6 +77,7 @@ class RenderGN:
         if recording.initial_parent_T_camera is None:
             raise Refusal("render_gn needs a start: initial_parent_T_camera, or --init FILE")
         robot, views = prepare(recording)
+        robot.check_start(recording)
         start = se3.inverse(recording.initial_parent_T_camera)
         trace = Trace()
         if any(self._camera_inside(view, start, trace) for view in views):
