@@ -159,6 +159,14 @@ def test_without_an_answer_there_is_still_a_verdict(rig, tmp_path):
     assert found.reasons == ["tsai: the hand hardly rotates"]
 
 
+def test_the_recommended_answer_comes_first_in_a_list(rig):
+    """Also before one with its own camera that predicts better, so that a script that takes the first is safe."""
+    fixed, free = freed(rig, gain=0.9, sigma_ratio=0.1)
+    found = judge(rig, free, fixed)
+    assert [e.solver for e in found.estimates] == ["bundle_intrinsics", "bundle"]
+    assert [e.solver for e in found.recommended_first(found.estimates)] == ["bundle", "bundle_intrinsics"]
+
+
 def test_file_round_trip(rig, tmp_path):
     written = judge(rig, answer(rig, "bundle"), answer(rig, "render", 60.0), at_m=np.ones(3))
     written.save(tmp_path / "verdict.json")
