@@ -79,8 +79,10 @@ def test_truth_does_not_enter(rig):
     estimates = [answer(rig, "tsai", 2.0, None), answer(rig, "bundle")]
     wrong = [replace(e, errors={"tre_mm": float(i)}) for i, e in enumerate(estimates)]
     first, second = (judge(rig, *each).to_json() for each in (estimates, wrong))
-    first.pop("estimates"), second.pop("estimates")
+    first.pop("estimates")
+    kept = [estimate["errors"] for estimate in second.pop("estimates")]
     assert first == second
+    assert {"tre_mm": 1.0} in kept
 
 
 def test_a_robot_that_is_seen_elsewhere_makes_the_answer_doubtful(rig):
