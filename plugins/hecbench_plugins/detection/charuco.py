@@ -78,7 +78,7 @@ def _cause(greys: Sequence[Grey | None], target: CharucoTarget) -> str:
             f"up to {max(map(len, seen))} markers of {target.dictionary}, ids {numbers[0]} to {numbers[-1]}, are seen "
             f"in {len(seen)} images, but not as a board of {target.columns} x {target.rows} squares: count them"
         )
-    if note := mirrored(greys, _corners, target, 0):
+    if note := mirrored(greys, _marker_ids, target.dictionary):
         return note.removeprefix("; ")
     return _dictionary_in(greys, target)
 
