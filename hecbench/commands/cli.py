@@ -154,9 +154,15 @@ def conformance(name: str, kind: str | None, as_json: bool) -> None:
 
 
 @cli.command()
+@click.option("--warm", is_flag=True, help="Compile now what the first calibration would have to wait for.")
 @choices.as_json
-def doctor(as_json: bool) -> None:
+def doctor(warm: bool, as_json: bool) -> None:
     """Say what is installed, what is missing and how to get it."""
+    if warm:
+        from hecbench.commands.warming import warm as warmed
+
+        for part in warmed():
+            console.say(f"{part.subject}: {part.seconds:.1f} s")
     from hecbench.commands import doctor as examination
     from hecbench.report.tables import Table
 
