@@ -225,8 +225,8 @@ def moveit_launch_ros2(estimate: Estimate, options: Mapping[str, str]) -> str:
 def camera_info(estimate: Estimate, options: Mapping[str, str]) -> str:
     """The calibrated camera as camera_calibration_parsers and camera_info_manager read it (YAML).
 
-    Five coefficients are plumb_bob, eight are rational_polynomial, four of a fisheye lens are equidistant; OpenCV's other
-    lengths have no name in ROS. The projection is that of the undistorted picture with the same K.
+    Five coefficients are plumb_bob, eight are rational_polynomial, four of a fisheye lens are equidistant; the other
+    lengths of OpenCV have no name in ROS. The projection is that of the undistorted picture with the same K.
 
     Raises:
         InputError: the estimate knows no intrinsics, or its distortion has no name in ROS.
@@ -260,7 +260,7 @@ def camera_info(estimate: Estimate, options: Mapping[str, str]) -> str:
         "rectification_matrix": matrix(np.eye(3)),
         "projection_matrix": matrix(projection),
     }
-    return yaml.safe_dump(content, sort_keys=False)
+    return str(yaml.safe_dump(content, sort_keys=False))
 
 
 def _ros_lens(camera: CameraModel) -> tuple[str, int]:
