@@ -22,6 +22,8 @@ _MOST_WRONG_BITS = 2
 _SURE_MARGIN = 100.0
 _LEAST_MARGIN = 20.0
 """Grey levels between a tag's bits and their threshold, below which a detection is more often noise than a tag."""
+_LEAST_SIDE = 8
+"""Pixels of the searched picture: cells of the smallest family with its margin. Below 4 pixels the library crashes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +50,8 @@ def detected(grey: NDArray[np.uint8], family: str, decimate: float = 1.0) -> lis
     Raises:
         InputError: pupil-apriltags is not installed, and OpenCV does not know the family.
     """
+    if min(grey.shape) < _LEAST_SIDE * decimate:
+        return []
     if find_spec("pupil_apriltags") is None:
         return detected_by_opencv(grey, family, decimate)
     return [

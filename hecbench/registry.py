@@ -10,6 +10,7 @@ import pkgutil
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
 from enum import StrEnum
 from functools import cache
 from importlib import import_module, metadata
@@ -111,7 +112,8 @@ class Registry:
         found = [plugin for plugin in self.select(kind) if plugin.name == plain]
         if not found:
             names = ", ".join(spec.name for spec in self.ready(kind, spec_type)) or "none"
-            raise InputError(f"no {kind} is called '{plain}': choose one of {names}")
+            hint = meant(plain, names.split(", "))
+            raise InputError(f"no {kind} is called '{plain}': choose one of {names}{hint}")
         plugin = found[0]
         if plugin.status is not PluginStatus.READY or not isinstance(plugin.spec, spec_type):
             raise InputError(f"{kind} '{plain}' is {plugin.status}: {plugin.detail}")
@@ -138,6 +140,12 @@ def _settings(kind: Kind, name: str) -> tuple[str, dict[str, str]]:
     if not rest.endswith("]") or not all(option and equals for option, equals, _ in pairs):
         raise InputError(f"{kind} '{name}': write options as {plain or kind}[option=value,option=value]")
     return plain, {option.strip(): value.strip() for option, _, value in pairs}
+
+
+def meant(word: str, known: Iterable[str]) -> str:
+    """ ", did you mean ...?" where something known is spelled nearly alike, else nothing."""
+    near = get_close_matches(word.lower(), list(known), n=2)
+    return f"; did you mean {' or '.join(near)}?" if near else ""
 
 
 @cache

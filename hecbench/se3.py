@@ -221,6 +221,12 @@ def to_quat_wxyz(a_T_b: ArrayLike) -> Array:
     return np.roll(to_quat_xyzw(a_T_b), 1, axis=-1)
 
 
+def from_rpy(rpy: ArrayLike) -> Array:
+    """Rotation (3, 3) of roll, pitch, yaw (3,) rad about the fixed axes x, y, z, as in URDF; inverts `to_rpy`."""
+    roll, pitch, yaw = np.asarray(rpy, float)
+    return so3_exp([0, 0, yaw]) @ so3_exp([0, pitch, 0]) @ so3_exp([roll, 0, 0])
+
+
 def to_rpy(rotation: ArrayLike) -> Array:
     """Roll, pitch, yaw (3,) rad of a rotation (3, 3) about the fixed axes x, y, z, as in URDF.
 

@@ -67,6 +67,10 @@ def locate(image: NDArray[np.uint8], camera: CameraModel, target: AprilTagTarget
             f"the picture is {image.shape[1]}x{image.shape[0]} px, the camera {camera.width}x{camera.height}:"
             " give the camera that took it"
         )
+    if image.dtype != np.uint8 or image.shape[2:] not in ((), (3,)):
+        raise InputError(
+            f"a picture of {image.shape} {image.dtype}: give (H, W, 3) RGB or (H, W) grey, 8 bits"
+        )
     grey = _grey(image)
     corners_px = _the_tag(grey, target)
     cell_px = float(np.linalg.norm(np.diff(corners_px, axis=0), axis=1).min()) / FAMILIES[target.family]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,6 +15,11 @@ from hecbench.errors import HecbenchError, InputError
 if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
+
+    from hecbench.recording import Recording
+    from hecbench.running.solving import Options
+    from hecbench.specs import SolverSpec
+    from hecbench.verdict import Verdict
 
 EXIT_CODES = {"good": 0, "usable": 0, "doubtful": 1, "do_not_use": 3}
 
@@ -61,8 +67,7 @@ def calibrate(
     usable, 1 when it is doubtful, 3 when it is not to be used.
     """
     from hecbench import preparation
-    from hecbench.report import html
-    from hecbench.running import calibrating, planning
+    from hecbench.running import planning
 
     at_m = _place(at)
     loaded = preparation.load_recording(recording).without_truth()
@@ -72,22 +77,39 @@ def calibrate(
             f"{recording}: no ready solver can use what it offers: {', '.join(sorted(loaded.offers()))}"
         )
     out = out or Path("out") / loaded.name
-    with console.Progress(specs) as progress:
-        examined = calibrating.examine(loaded, segmenter)
-        for note in examined.segmented.recording.notes:
-            console.say(note)
-        options = choices.run_options(seed, held_out, segmenter, timeout_s)
-        estimates = calibrating.solved(examined, specs, options, progress.start, progress.done)
-        progress.writing()
-        found = calibrating.judged(examined, specs, estimates, tolerance_mm, at_m)
-        calibrating.Calibration(found, examined.evidence()).save(out)
-        page = html.write(out).path
+    options = choices.run_options(seed, held_out, segmenter, timeout_s)
+    found, page = calibrate_into(out, loaded, specs, options, tolerance_mm, at_m)
     if as_json:
         console.print_json(found.to_json())
     else:
         console.print_verdict(found)
     click.echo(f"report: {page}", err=True)
     sys.exit(EXIT_CODES[found.grade])
+
+
+def calibrate_into(
+    out: Path,
+    recording: Recording,
+    specs: Sequence[SolverSpec],
+    options: Options,
+    tolerance_mm: float = 5.0,
+    at_m: NDArray[np.float64] | None = None,
+) -> tuple[Verdict, Path]:
+    """Check, solve, judge, and leave everything in a folder; returns the verdict and the page."""
+    from hecbench.report import html, pictures
+    from hecbench.running import calibrating
+
+    with console.Progress(specs) as progress:
+        examined = calibrating.examine(recording, options.segmenter)
+        for note in examined.segmented.recording.notes:
+            console.say(note)
+        estimates = calibrating.solved(examined, specs, options, progress.start, progress.done)
+        progress.writing()
+        found = calibrating.judged(examined, specs, estimates, tolerance_mm, at_m)
+        calibrating.Calibration(found, examined.evidence()).save(out)
+        if found.recommended is not None:
+            pictures.write(examined.segmented.recording, found.recommended, out)
+        return found, html.write(out).path
 
 
 def _place(text: str | None) -> NDArray[np.float64] | None:

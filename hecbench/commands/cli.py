@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from difflib import get_close_matches
 from importlib import metadata
 from pathlib import Path
 
@@ -18,8 +19,10 @@ import click
 from hecbench import __version__
 from hecbench.commands import choices, console
 from hecbench.commands.calibrate import calibrate
+from hecbench.commands.robot import robot
 from hecbench.commands.run import demo, run
 from hecbench.commands.solve import solve
+from hecbench.commands.view import view
 from hecbench.errors import HecbenchError, InputError
 
 COMMAND_GROUP = "hecbench.commands"
@@ -37,6 +40,15 @@ class _Verbs(click.Group):
             return command
         found = list(metadata.entry_points(group=COMMAND_GROUP, name=cmd_name))
         return found[0].load() if found else None
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        if self.get_command(ctx, args[0]) is None:
+            near = get_close_matches(args[0], self.list_commands(ctx), n=2)
+            hint = f", did you mean {' or '.join(near)}?" if near else ": see hecbench --help"
+            raise click.UsageError(f"no verb is called '{args[0]}'{hint}", ctx)
+        return super().resolve_command(ctx, args)
 
 
 def main() -> None:
@@ -72,7 +84,7 @@ def cli() -> None:
     """Calibrate hand-eye rigs with every method, measure all by the same rulers, and report."""
 
 
-for _verb in (calibrate, demo, run, solve):
+for _verb in (calibrate, demo, robot, run, solve, view):
     cli.add_command(_verb)
 
 
@@ -83,11 +95,14 @@ def plugins(kind: str | None, as_json: bool) -> None:
     """List every plugin, also those that are missing something, broken or in conflict."""
     from hecbench import registry
     from hecbench.report.tables import Table
+    from hecbench.robots import packages
     from hecbench.specs import Kind
 
     if kind is not None and kind not in list(Kind):
         raise InputError(f"--kind {kind}: choose one of {', '.join(Kind)}")
     rows = [plugin.row() for plugin in registry.load().select(Kind(kind) if kind else None)]
+    if kind == Kind.ROBOT:
+        rows += [robot.row() for robot in (*packages.of_entry_points(), *packages.of_distributions())]
     if as_json:
         console.print_json(rows)
         return
@@ -140,9 +155,15 @@ def conformance(name: str, kind: str | None, as_json: bool) -> None:
 
 
 @cli.command()
+@click.option("--warm", is_flag=True, help="Compile now what the first calibration would have to wait for.")
 @choices.as_json
-def doctor(as_json: bool) -> None:
+def doctor(warm: bool, as_json: bool) -> None:
     """Say what is installed, what is missing and how to get it."""
+    if warm:
+        from hecbench.commands.warming import warm as warmed
+
+        for part in warmed():
+            console.say(f"{part.subject}: {part.seconds:.1f} s")
     from hecbench.commands import doctor as examination
     from hecbench.report.tables import Table
 

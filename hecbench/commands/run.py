@@ -27,20 +27,34 @@ if TYPE_CHECKING:
 )
 @choices.seed
 def demo(out: Path, samples: int, seed: int) -> None:
-    """Calibrate generated recordings with every ready solver; print the tables and write the report."""
+    """Calibrate photographs of a real robot, with its board and without, then generated recordings.
+
+    Prints the verdict and the tables, and writes the report. Needs neither network nor graphics.
+    """
+    from hecbench import registry
+    from hecbench.commands.calibrate import calibrate_into
     from hecbench.report import html
+    from hecbench.report.tables import Group, table
     from hecbench.running import planning
+    from hecbench.specs import Kind, SuiteSpec
     from hecbench.storage import store
 
     levels = ("tag_2m", "small_tag_2m", "board_2m")
-    tasks = planning.suite_tasks("markers", levels, samples, (), seed)
     if (out / store.FILE_NAME).exists():
         strange = next(
             (e for e in store.read(out).estimates if (e.suite, e.level in levels) != ("markers", True)), None
         )
         if strange is not None:
             raise InputError(f"{out}: holds results of another run ({strange.recording}); give another --out")
-    contents = _run(tasks, out, choices.run_options(seed), jobs=os.cpu_count() or 1, resume=True)
+    options = choices.run_options(seed)
+    photographs = registry.load().get(Kind.SUITE, "photographs", SuiteSpec)
+    recording = photographs.make(photographs.levels[0], 0, seed)
+    found, _ = calibrate_into(out, recording, planning.solvers_for((), recording), options)
+    console.print_table(table(Group(recording.name, tuple(found.estimates), is_level=False)))
+    console.print_verdict(found)
+    click.echo()
+    tasks = planning.suite_tasks("markers", levels, samples, (), seed)
+    contents = _run(tasks, out, options, jobs=os.cpu_count() or 1, resume=True)
     console.print_tables(contents.estimates)
     click.echo(f"report: {html.write(out).path}")
 

@@ -25,7 +25,9 @@ if TYPE_CHECKING:
 @choices.unknown
 @click.option("--views", type=click.IntRange(min=1), help="Use this many samples, drawn with --seed.")
 @click.option(
-    "--init", type=choices.FILE, help="An estimate to start from instead of initial_parent_T_camera."
+    "--init",
+    metavar="START",
+    help="Start from an estimate, a 4x4 in JSON, 'x y z roll pitch yaw', or 'looking-at x y z'.",
 )
 @choices.held_out
 @choices.check
@@ -44,7 +46,7 @@ def solve(
     segmenter: str | None,
     unknown: tuple[str, ...],
     views: int | None,
-    init: Path | None,
+    init: str | None,
     held_out: bool | None,
     check: bool,
     timeout_s: float | None,
@@ -73,6 +75,8 @@ def solve(
         critical = console.print_critical(examined.findings_json, loaded.name)
         estimates = best_first(calibrating.solved(examined, specs, options, progress.start, progress.done))
     verdict = calibrating.judged(examined, specs, estimates) if check else None
+    if verdict is not None and loaded.truth_parent_T_camera is None:
+        estimates = verdict.recommended_first(estimates)
     if out is not None:
         _save(estimates, examined, verdict, out)
     if as_json:
@@ -92,6 +96,7 @@ def solve(
 
 def _save(estimates: Sequence[Estimate], examined: Examined, verdict: Verdict | None, out: Path) -> None:
     """A file for each estimate, and what `report` shows beside them."""
+    from hecbench.report import pictures
     from hecbench.storage import evidence, results
 
     for estimate in estimates:
@@ -99,3 +104,5 @@ def _save(estimates: Sequence[Estimate], examined: Examined, verdict: Verdict | 
     evidence.save(examined.evidence(), out)
     if verdict is not None:
         verdict.save(out / results.VERDICT_NAME)
+    if verdict is not None and verdict.recommended is not None:
+        pictures.write(examined.segmented.recording, verdict.recommended, out)

@@ -7,10 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hecbench import files, verdict
+from hecbench import __version__, files, verdict
 from hecbench.errors import InputError
 from hecbench.estimate import Estimate, best_first
+from hecbench.report import pictures
 from hecbench.report.figures import figures
+from hecbench.report.first_screen import FirstScreen, first_screen
 from hecbench.report.recording_figures import agreement_figure, overlays, residual_figure, scene_figure
 from hecbench.report.section import Section
 from hecbench.report.studies import is_study
@@ -21,6 +23,7 @@ from hecbench.storage import evidence, results, store, trial_record
 from hecbench.storage.evidence import Evidence
 from hecbench.storage.results import VERDICT_NAME
 from hecbench.storage.trial_record import TrialRecord
+from hecbench.verdict import Verdict
 
 FILE_NAME = "report.html"
 
@@ -45,10 +48,7 @@ def write(folder: Path) -> Written:
     trials = trial_record.read(folder) if has_trials else trial_record.Contents([], [], [])
     judged = verdict.load(folder / VERDICT_NAME) if (folder / VERDICT_NAME).is_file() else None
     alone = has_trials and judged is None and not (folder / store.FILE_NAME).is_file()
-    if judged is not None:
-        contents = store.Contents(list(judged.estimates), [])
-    else:
-        contents = store.Contents([], []) if alone else results.read(folder)
+    contents = store.Contents([], []) if alone else _results(folder, judged)
     if not contents.estimates and not alone:
         raise InputError(f"{folder}: its store holds no whole result; run again with `hecbench run --resume`")
     damage = [*contents.damage, *trials.damage]
@@ -59,9 +59,18 @@ def write(folder: Path) -> Written:
         lambda sha256: evidence.load(folder, sha256),
         trials.trials,
         folder,
+        None if judged is None else first_screen(judged, pictures.load(folder)),
     )
     files.write_text(folder / FILE_NAME, text)
     return Written(folder / FILE_NAME, len(contents.estimates), len(trials.trials), damage)
+
+
+def _results(folder: Path, judged: Verdict | None) -> store.Contents:
+    """The estimates of a verdict and those of a store beside it, or whatever a verb left in the folder."""
+    if judged is None:
+        return results.read(folder)
+    stored = store.read(folder) if (folder / store.FILE_NAME).is_file() else store.Contents([], [])
+    return store.Contents([*judged.estimates, *stored.estimates], stored.damage)
 
 
 def page(
@@ -71,9 +80,10 @@ def page(
     evidence: Callable[[str], Evidence | None],
     trials: Sequence[TrialRecord] = (),
     folder: Path | None = None,
+    first: FirstScreen | None = None,
 ) -> str:
     """The HTML text of a report on these estimates and trials; `evidence` gives what a run kept of a recording, by
-    hash; pictures of trials are in `folder`.
+    hash; pictures of trials are in `folder`; `first` comes before all.
     """
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
@@ -81,26 +91,33 @@ def page(
         loader=PackageLoader("hecbench.report"), autoescape=True, undefined=StrictUndefined, trim_blocks=True
     )
     sections = sections_of_studies(estimates) + sections_of_trials(trials, folder)
-    sections += [_section(group, evidence) for group in groups(estimates)]
+    judged = first.verdict.recording if first else None
+    ordered = sorted(groups(estimates), key=lambda group: (group.is_level, group.title != judged))
+    sections += [_section(group, evidence, has_dots=group.title == judged) for group in ordered]
     sections.sort(key=lambda section: section.folded)
     return environment.get_template("report.html.j2").render(
         sections=sections,
+        first=first,
         damage=damage,
         command=command,
         runs=len(estimates),
         trials=len(trials),
         methods=len({trial.method for trial in trials}),
         recordings=len({e.provenance.get("recording_sha256") for e in estimates}),
-        solvers=sorted({e.solver for e in estimates}),
-        seeds=_values(estimates, "seed"),
-        versions=_values(estimates, "hecbench"),
-        libraries=_values(estimates, "versions"),
+        solvers={e.solver for e in estimates},
+        provenance=[
+            ("hecbench", _values(estimates, "hecbench") or [__version__]),
+            ("libraries", _values(estimates, "versions")),
+            ("seeds", _values(estimates, "seed")),
+            ("solvers", sorted({e.solver for e in estimates})),
+            ("trials", sorted({trial.method for trial in trials})),
+        ],
     )
 
 
-def _section(group: Group, evidence: Callable[[str], Evidence | None]) -> Section:
+def _section(group: Group, evidence: Callable[[str], Evidence | None], has_dots: bool) -> Section:
     """What the page shows of one level or recording; levels of a study are told there and folded here."""
-    drawn = figures(group)
+    drawn = [] if has_dots else figures(group)
     shown = None if group.is_level else evidence(str(group.estimates[0].provenance.get("recording_sha256")))
     best = best_first(group.estimates)
     if shown is not None:

@@ -19,7 +19,10 @@ SUCCESS_MM, SUCCESS_RAD = 5.0, 0.01
 
 @dataclass(frozen=True)
 class Table:
-    """Cells as text. The first `left` columns are words, the rest numbers; `looks` are names of styles, one a row."""
+    """Cells as text. The first `left` columns are words, the rest numbers; `looks` are names of styles, one a row.
+
+    The columns named in `secondary` are shown on the page when they are asked for.
+    """
 
     title: str
     header: tuple[str, ...]
@@ -27,6 +30,7 @@ class Table:
     notes: tuple[str, ...] = field(default=())
     left: int = 1
     looks: tuple[str, ...] = ()
+    secondary: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -52,7 +56,8 @@ def groups(estimates: Iterable[Estimate]) -> list[Group]:
         masks = f", masks: {segmenter}" if segmenter else ""
         if estimate.level is not None:
             return f"{estimate.suite}: {estimate.level}{masks}", "level"
-        return f"{estimate.recording} ({estimate.item}){masks}", "item"
+        where = f" ({estimate.item})" if estimate.item else ""
+        return f"{estimate.recording}{where}{masks}", "item"
 
     ordered = sorted(estimates, key=place)
     return [
@@ -163,8 +168,10 @@ def _recording_table(title: str, estimates: Sequence[Estimate]) -> Table:
         *_reasons(estimates),
         *not_as_published(estimates),
     )
-    return Table(title, ("solver", "status", "rank", *shown), rows, notes, left=2)
+    return Table(title, ("solver", "status", "rank", *shown), rows, notes, left=2, secondary=_SECONDARY)
 
+
+_SECONDARY = frozenset({"median px", "median mm", "held-out deg", "spread deg", "masks IoU with given"})
 
 _EXPLANATIONS = {
     "held-out mm [95 %]": "Held-out: rms prediction of samples left out in 5 folds, the target pose refitted by the "

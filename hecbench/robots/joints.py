@@ -46,6 +46,12 @@ class Joint:
     offset: float = 0.0
 
     @property
+    def kind(self) -> str:
+        """Its type as a URDF spells it."""
+        unlimited = self.motion is Motion.REVOLUTE and not np.isfinite([self.lower, self.upper]).all()
+        return "continuous" if unlimited else str(self.motion)
+
+    @property
     def hair(self) -> float:
         """How far beyond its limits a position is still accepted, rad or m."""
         span = self.upper - self.lower

@@ -90,7 +90,7 @@ def _collada(content: bytes, path: Path, notes: list[str]) -> list[Piece]:
     import collada
     from lxml import etree
 
-    root = xml.parse(content, f"{path}: not a readable mesh")
+    root = xml.parse(content, f"{path}: not a readable mesh", mesh=True)
     described = materials.of_collada(root, path)
     expected = _plain(root, path, notes)
     document = collada.Collada(io.BytesIO(etree.tostring(root)), ignore=[collada.common.DaeError])

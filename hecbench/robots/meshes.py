@@ -25,7 +25,7 @@ from hecbench.robots.sheets import seen_from_behind
 from hecbench.robots.urdf import Mesh, Primitive, Visual
 from hecbench.robots.urdf_files import find_mesh, find_texture
 
-_CACHE_VERSION = 4
+_CACHE_VERSION = 5
 _GREY = (0.7, 0.7, 0.7)
 _SAME_M = 1e-6
 """Vertices this close are one."""
@@ -45,6 +45,8 @@ class Part:
     """(F, 3), counter-clockwise seen from outside."""
     both_sides: NDArray[np.bool_] = field(repr=False, default_factory=lambda: np.zeros(0, bool))
     """(F,) whose back is seen as well, as in surfaces that do not close; empty: none."""
+    source: str = ""
+    """Name of the mesh file; empty for a box, cylinder or sphere."""
 
 
 def visual_parts(visuals: Sequence[Visual], urdf: Path) -> tuple[tuple[Part, ...], tuple[str, ...]]:
@@ -75,11 +77,11 @@ def visual_parts(visuals: Sequence[Visual], urdf: Path) -> tuple[tuple[Part, ...
 def _pieces(
     visual: Visual, found: dict[str, Path], textures: dict[str, Path | None], notes: list[str]
 ) -> list[Part]:
-    scale = np.ones(3)
+    scale, source = np.ones(3), ""
     if isinstance(visual.shape, Mesh):
         pieces, said = mesh_files.read(found[visual.shape.filename])
         notes += said
-        scale = visual.shape.scale
+        scale, source = visual.shape.scale, found[visual.shape.filename].name
     else:
         pieces = [_primitive(visual.shape)]
     colour = visual.colour
@@ -102,7 +104,8 @@ def _pieces(
         vertices = (piece.vertices * scale) @ visual.origin[:3, :3].T + visual.origin[:3, 3]
         chosen = (piece.colour if own else None) or colour or piece.colour or _GREY
         name = f"{visual.link}/{piece.name}"
-        parts.append(Part(name, visual.link, chosen, vertices, np.ascontiguousarray(faces, np.int32)))
+        indices = np.ascontiguousarray(faces, np.int32)
+        parts.append(Part(name, visual.link, chosen, vertices, indices, source=source))
     return parts
 
 
@@ -152,7 +155,7 @@ def _digest(urdf: Path, used: Iterable[Path]) -> str:
 def _read(entry: Path) -> tuple[tuple[Part, ...], tuple[str, ...]] | None:
     try:
         with np.load(entry, allow_pickle=False) as data:
-            columns = zip(data["names"], data["links"], data["colours"], strict=True)
+            columns = zip(data["names"], data["links"], data["colours"], data["sources"], strict=True)
             parts = tuple(
                 Part(
                     str(name),
@@ -161,8 +164,9 @@ def _read(entry: Path) -> tuple[tuple[Part, ...], tuple[str, ...]] | None:
                     data[f"vertices{i}"],
                     data[f"faces{i}"],
                     data[f"both_sides{i}"],
+                    str(source),
                 )
-                for i, (name, link, rgb) in enumerate(columns)
+                for i, (name, link, rgb, source) in enumerate(columns)
             )
             return parts, tuple(str(note) for note in data["notes"])
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
@@ -175,6 +179,7 @@ def _write(entry: Path, parts: tuple[Part, ...], notes: list[str]) -> None:
         "names": np.array([part.name for part in parts]),
         "links": np.array([part.link for part in parts]),
         "colours": np.array([part.colour for part in parts], float).reshape(-1, 3),
+        "sources": np.array([part.source for part in parts], str),
         "notes": np.array(notes, str),
     }
     for i, part in enumerate(parts):

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from hecbench import se3
 from hecbench.errors import InputError
-from hecbench.robots import urdf
+from hecbench.robots import packages, urdf
 from hecbench.robots.joints import Joint, Motion
 from hecbench.robots.meshes import Part, visual_parts
 
@@ -185,17 +185,19 @@ class RobotModel:
 
 
 def load_robot(name: str | Path, *, exclude: Iterable[str] = (), meshes: bool = True) -> RobotModel:
-    """A known robot by name (``ur5e``, ``ur3e``, also ``+robotiq_2f_85``) or any robot by its URDF's path.
+    """A known robot by name (``ur5e``, ``ur3e``, also ``+robotiq_2f_85``) or any robot by its URDF.
 
     Args:
-        name: the name or the path.
+        name: the name, the path of a URDF, ``PACKAGE:PATH``, or a name that an installed package gives
+            (see `hecbench.robots.packages`).
         exclude: shell patterns of parts, ``link/material``, that this robot does not have. The power cable
             and the lettering that the known models carry are always left out: they are not on every robot.
         meshes: False loads the kinematics alone.
     """
     arm, _, tool = str(name).partition("+")
     if arm not in KNOWN_ARMS:
-        model = _from_urdf(Path(name), Path(name).stem, meshes)
+        path = Path(name) if Path(name).is_file() else packages.find(str(name)) or Path(name)
+        model = _from_urdf(path, path.stem, meshes)
     elif tool not in ("", GRIPPER):
         raise InputError(f"robot '{name}': the known tool is {GRIPPER}")
     else:
@@ -216,7 +218,10 @@ def _airo_models() -> Path:
 
 def _from_urdf(path: Path, name: str, meshes: bool) -> RobotModel:
     if not path.is_file():
-        raise InputError(f"{path}: no such URDF file; known robots: {', '.join(KNOWN_ARMS)}")
+        raise InputError(
+            f"{path}: no such URDF file; known robots: {', '.join(KNOWN_ARMS)}, and those that"
+            " hecbench plugins --kind robot lists"
+        )
     description = urdf.read(path)
     parts, notes = visual_parts(description.visuals, path) if meshes else ((), ())
     return RobotModel(name, description.joints, description.links, parts, (*description.notes, *notes))

@@ -10,12 +10,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
-from hecbench.errors import InputError
+from hecbench.errors import InputError, Refusal
 from hecbench.recording import Recording
 from hecbench.robots.model import RobotModel, load_robot
 
 Array = NDArray[np.float64]
 
+_FARTHEST_M = 50.0
+"""Of the robot from a camera that calibrates it; the starts beyond are in millimetres."""
+_OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
+"""opencv_T_opengl: y up, z backward."""
 _STEP_RAD = 1e-4
 """Of the central differences that give the joints' twists; their error is its square."""
 
@@ -96,6 +100,32 @@ class PosedRobot:
         )
         return poses
 
+    def check_start(self, recording: Recording) -> None:
+        """Refuse a start from which no camera can see the robot, and say what it fits instead.
+
+        Raises:
+            Refusal: the robot is behind the camera, or farther off than any camera looks.
+        """
+        start = recording.initial_parent_T_camera
+        if start is None or not len(self.samples):
+            return
+        origins = self.link_poses(self.joints_rad[self.samples])[..., :3, 3].reshape(-1, 3)
+
+        def seen_from(parent_T_camera: Array) -> Array:
+            return np.asarray(se3.transform_points(se3.inverse(parent_T_camera), origins))
+
+        away = float(np.linalg.norm(seen_from(start).mean(0)))
+        if away > _FARTHEST_M:
+            raise Refusal(
+                f"at the start the robot is {away:,.0f} m from the camera: initial_parent_T_camera in millimetres?"
+            )
+        if (seen_from(start)[:, 2] > 0).any():
+            return
+        others = {"OpenGL axes": start @ _OPENGL, "camera_T_parent: give its inverse": se3.inverse(start)}
+        fitting = [name for name, pose in others.items() if _in_view(seen_from(pose), recording)]
+        reason = f"; this start fits {fitting[0]}" if fitting else ""
+        raise Refusal(f"at the start the robot is behind the camera: z must look forward (OpenCV){reason}")
+
     def link_poses(self, joints_rad: Array) -> Array:
         """parent_T_link (..., L, 4, 4) m at joints (..., J); an `InputError` for joints outside their limits."""
         return self.model.link_poses(joints_rad, self.joint_names, frame=self.parent_link)
@@ -111,3 +141,12 @@ class PosedRobot:
         after = self.clipped_link_poses(joints_rad[..., None, :] + steps)
         before = self.clipped_link_poses(joints_rad[..., None, :] - steps)
         return np.asarray(se3.log(after @ se3.inverse(before)) / (2 * _STEP_RAD))
+
+
+def _in_view(points: Array, recording: Recording) -> bool:
+    """Whether the middle of points (N, 3) m in the camera's frame is in its picture."""
+    camera, middle = recording.camera, points.mean(0)
+    if middle[2] <= 0 or camera is None or camera.K is None:
+        return bool(middle[2] > 0)
+    u, v, _ = camera.K @ (middle / middle[2])
+    return bool(0 <= u < camera.width and 0 <= v < camera.height)

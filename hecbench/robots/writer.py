@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench.robots.joints import Joint, Motion
+from hecbench.robots.joints import Joint
 from hecbench.robots.meshes import Part
 from hecbench.robots.model import RobotModel
 
@@ -42,8 +42,7 @@ def _add_visual(link: ElementTree.Element, part: Part, file: str) -> None:
 
 def _add_joint(robot: ElementTree.Element, joint: Joint) -> None:
     limited = np.isfinite([joint.lower, joint.upper]).all()
-    kind = "continuous" if joint.motion is Motion.REVOLUTE and not limited else str(joint.motion)
-    element = ElementTree.SubElement(robot, "joint", name=joint.name, type=kind)
+    element = ElementTree.SubElement(robot, "joint", name=joint.name, type=joint.kind)
     ElementTree.SubElement(element, "parent", link=joint.parent)
     ElementTree.SubElement(element, "child", link=joint.child)
     ElementTree.SubElement(

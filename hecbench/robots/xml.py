@@ -10,7 +10,7 @@ _HARMLESS = "NS_ERR_UNDEFINED_NAMESPACE"
 """A prefix nobody declared: the names with a prefix are other programs', and are dropped."""
 
 
-def parse(content: bytes, where: str) -> Any:
+def parse(content: bytes, where: str, *, mesh: bool = False) -> Any:
     """The root element (lxml) of a document in any encoding, without comments.
 
     Text that is not in its encoding is taken for Latin-1, in which every byte is a letter: it stands in comments
@@ -19,6 +19,7 @@ def parse(content: bytes, where: str) -> Any:
     Args:
         content: the file.
         where: for the error: the file's name and what it should be.
+        mesh: texts of more than 10 MB are allowed, as lists of vertices need them, and 2048 levels.
 
     Raises:
         InputError: it is no XML, nested deeper than 256 elements, or it declares entities.
@@ -26,12 +27,11 @@ def parse(content: bytes, where: str) -> Any:
     from lxml import etree
 
     content = content.lstrip()
-    parser = _parser()
-    root, fault = _root(content, parser)
+    root, fault = _root(content, _parser(mesh))
     if root is None or (fault is not None and "ENCODING" in fault.type_name):
         head, end, body = content.partition(b"?>")
         plain = body if head.startswith(b"<?xml") and end else content
-        again, other = _root(plain.decode("latin-1").encode(), _parser())
+        again, other = _root(plain.decode("latin-1").encode(), _parser(mesh))
         root, fault = (again, other) if again is not None else (root, fault)
     if root is None or fault is not None:
         reason = "it is empty" if fault is None else f"line {fault.line}: {fault.message}"
@@ -43,11 +43,12 @@ def parse(content: bytes, where: str) -> Any:
     return root
 
 
-def _parser() -> Any:
+def _parser(huge: bool) -> Any:
     from lxml import etree
 
     return etree.XMLParser(
         recover=True,
+        huge_tree=huge,
         resolve_entities=False,
         no_network=True,
         load_dtd=False,

@@ -8,15 +8,16 @@ from pathlib import Path
 
 import numpy as np
 
-from hecbench import estimate, preparation, registry
+from hecbench import preparation, registry
 from hecbench.errors import InputError
 from hecbench.recording import Recording, RobotDescription
 from hecbench.robots.posed import PosedRobot
 from hecbench.running.runner import Task
+from hecbench.running.starts import start_of
 from hecbench.specs import Kind, SegmenterSpec, SolverSpec, SuiteSpec
 
 
-def adjusted(recording: Recording, views: int | None, init: Path | None, seed: int) -> Recording:
+def adjusted(recording: Recording, views: int | None, init: str | None, seed: int) -> Recording:
     """The recording with fewer samples and another start, as asked for."""
     if views is not None:
         if views > len(recording):
@@ -24,13 +25,7 @@ def adjusted(recording: Recording, views: int | None, init: Path | None, seed: i
         chosen = np.random.default_rng(seed).choice(len(recording), views, replace=False)
         recording = recording.subset(np.sort(chosen))
     if init is not None:
-        start = estimate.load(init)
-        here, there = (recording.mounting, recording.parent_link), (start.mounting, start.parent_link)
-        if start.parent_T_camera is None or here != there:
-            raise InputError(
-                f"{init}: is {start.status}, {' from '.join(there)}; the recording needs {' from '.join(here)}"
-            )
-        recording = replace(recording, initial_parent_T_camera=start.parent_T_camera)
+        recording = replace(recording, initial_parent_T_camera=start_of(init, recording))
     return recording
 
 
@@ -105,7 +100,10 @@ def tasks(
     found = []
     for source in sources:
         if not Path(source).exists():
-            raise InputError(f"{source}: is neither a suite ({', '.join(suites)}) nor a path that exists")
+            hint = registry.meant(source, suites)
+            raise InputError(
+                f"{source}: is neither a suite ({', '.join(suites)}) nor a path that exists{hint}"
+            )
         specs = solvers_for(solvers, preparation.load_recording(Path(source)), segmenter)
         found.append(Task(tuple(spec.name for spec in specs), path=Path(source)))
     return found
@@ -123,7 +121,8 @@ def suite_tasks(
     suite = registry.load().get(Kind.SUITE, name, SuiteSpec)
     for level in levels:
         if level not in suite.levels:
-            raise InputError(f"--level {level}: the suite '{name}' has {', '.join(suite.levels)}")
+            hint = registry.meant(level, suite.levels)
+            raise InputError(f"--level {level}: the suite '{name}' has {', '.join(suite.levels)}{hint}")
     found = []
     for level in levels or suite.levels:
         meant = solvers or suite.solvers(level)

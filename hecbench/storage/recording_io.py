@@ -300,7 +300,7 @@ def save(recording: Recording, folder: str | Path) -> None:
         "mounting": recording.mounting,
         "robot": robot,
         "camera": camera,
-        "target": _target_json(recording.target),
+        "target": target_json(recording.target),
         "initial_parent_T_camera": recording.initial_parent_T_camera,
         "truth_parent_T_camera": recording.truth_parent_T_camera,
         "samples": [{key: value for key, value in sample.items() if value is not None} for sample in samples],
@@ -316,12 +316,13 @@ def _sample_value(array: NDArray[np.float64] | None, index: int) -> Any:
     return [None if np.isnan(point).any() else point for point in row] if np.isnan(row).any() else row
 
 
-def _target_json(target: Target | None) -> dict[str, Any] | None:
+def target_json(target: Target | None) -> dict[str, Any] | None:
+    """A target as the recording's JSON describes it."""
     match target:
         case None:
             return None
         case PointsTarget():
-            return {"kind": target.kind, "points_m": target.points_m}
+            return {"kind": target.kind, "points_m": plain(target.points_m)}
         case _:
             declared = [name for name in target.__annotations__ if name != "kind"]
             return {"kind": target.kind} | {name: getattr(target, name) for name in declared}

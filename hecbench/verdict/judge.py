@@ -21,6 +21,8 @@ from hecbench.workspace import points_in_parent
 Array = NDArray[np.float64]
 
 TOLERANCE_MM = 5.0
+_WORTH = 0.9
+"""Of another method's rms residual on left-out samples, below which a method is better in practice."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +52,7 @@ def judge(
         tolerance_mm: the error in the workspace that the user can live with.
         at_m: (3,) a place in the parent where the error is wanted too.
     """
+    given = {estimate.solver: estimate for estimate in estimates}
     ordered = best_first([replace(estimate, errors=None) for estimate in estimates])
     if recording.base_T_flange is None:
         return _without_answer(recording, ordered, findings, tolerance_mm)
@@ -59,12 +62,7 @@ def judge(
     best = _recommended(answers, scales, recording.camera)
     if best is None:
         return _without_answer(recording, ordered, findings, tolerance_mm)
-    others = sorted(
-        (answer for answer in answers if answer is not best),
-        key=lambda answer: distance_m(best, answer, scales.points_m),
-    )
-    near = [answer for answer in others if agree(best, answer, scales.points_m, scales.tolerance_m)]
-    far = [answer for answer in others if answer not in near]
+    near, far = _divided(best, answers, scales)
     expected, at = _expected(best, near, scales, at_m)
     suspicion = cameras.suspicion(answers, best, recording.camera)
     doubts = _doubts(best, near, far) + ([suspicion] if suspicion else [])
@@ -81,20 +79,30 @@ def judge(
         recording=recording.name,
         grade=grade,
         rule=rule,
-        recommended=best.estimate,
+        recommended=given[best.solver],
         expected=expected,
         at=at,
         tolerance_mm=tolerance_mm,
         agreement=[Agreement(a.solver, apart_mm(a), a.evidence) for a in near],
         rivals=[
-            Rival(a.solver, apart_mm(a), words.why_apart(a, best, metric, recording.camera, findings))
+            Rival(a.solver, apart_mm(a), words.why_apart(a, best, near, metric, recording.camera, findings))
             for a in far
         ],
         reasons=words.reasons(best, near, confirmed, doubts, recording, apart_mm),
         findings=findings,
         next=words.what_next(findings, expected, tolerance_mm, suspicion, len(recording)),
-        estimates=ordered,
+        estimates=[given[estimate.solver] for estimate in ordered],
     )
+
+
+def _divided(best: Answer, answers: Sequence[Answer], scales: Scales) -> tuple[list[Answer], list[Answer]]:
+    """The other answers, nearest first: those that agree with the best, and those that do not."""
+    others = sorted(
+        (answer for answer in answers if answer is not best),
+        key=lambda answer: distance_m(best, answer, scales.points_m),
+    )
+    near = [answer for answer in others if _agree(best, answer, scales)]
+    return near, [answer for answer in others if answer not in near]
 
 
 def _recommended(answers: Sequence[Answer], scales: Scales, given: CameraModel | None) -> Answer | None:
@@ -109,10 +117,11 @@ def _recommended(answers: Sequence[Answer], scales: Scales, given: CameraModel |
     modelled = [answer for answer in fixed if answer.has_covariance()]
     best = min(modelled, key=lambda answer: answer.rms_m) if modelled else fixed[0]
     for rival in fixed:  # best predictor first
-        better = rival.sees_target == best.sees_target and predicts_better(
-            rival.estimate, best.estimate, _shared_numbers(rival, best)
-        )
-        if better and np.isfinite(rival.rms_m):
+        if (
+            rival.sees_target == best.sees_target
+            and np.isfinite(rival.rms_m)
+            and _predicts_better(rival, best)
+        ):
             best = rival
             break
     for free in answers:
@@ -138,10 +147,16 @@ def _agree(first: Answer, second: Answer, scales: Scales) -> bool:
     return agree(first, second, scales.points_m, scales.tolerance_m)
 
 
-def _shared_numbers(first: Answer, second: Answer) -> tuple[str, ...]:
-    """The held-out numbers by which two answers can be compared: pixels where both have them, else millimetres."""
-    both = [set(answer.estimate.held_out or {}) for answer in (first, second)]
-    return tuple(n for n in ("reprojection_px", "target_mm") if f"{n}_by_sample" in both[0] & both[1])
+def _predicts_better(first: Answer, second: Answer) -> bool:
+    """Beyond chance by every number that both have, and by a tenth: of a dozen methods one is better by chance."""
+    shared = []
+    for name in ("reprojection_px", "target_mm"):
+        one, two = ((answer.estimate.held_out or {}).get(name) for answer in (first, second))
+        if one is not None and two is not None:
+            if one > _WORTH * two:
+                return False
+            shared.append(name)
+    return bool(shared) and predicts_better(first.estimate, second.estimate, shared)
 
 
 def _expected(
@@ -173,7 +188,7 @@ def _doubts(best: Answer, near: Sequence[Answer], far: Sequence[Answer]) -> list
         )
     for answer in far:
         same_kind = answer.sees_target == best.sees_target and not answer.moved_camera
-        if same_kind and predicts_better(answer.estimate, best.estimate, _shared_numbers(answer, best)):
+        if same_kind and _predicts_better(answer, best):
             doubts.append(f"{answer.solver} lies elsewhere and predicts left-out samples better")
     return doubts
 

@@ -67,6 +67,7 @@ def _looked_at(recording: Recording) -> str:
 def why_apart(
     answer: Answer,
     best: Answer,
+    near: Sequence[Answer],
     metric: Metric | None,
     camera: CameraModel | None,
     findings: Sequence[dict[str, Any]],
@@ -77,7 +78,7 @@ def why_apart(
         return why + ("" if cameras.determined(answer) else ", which the samples do not determine")
     if best.moved_camera and not answer.moved_camera:
         return f"it keeps the recording's camera; {best.solver} {cameras.moved(best, camera)}"
-    if answer.sees_target != best.sees_target:
+    if answer.sees_target not in {each.sees_target for each in (best, *near)}:
         return f"it looks at {_LOOKS_AT[answer.sees_target]}: the models of target, robot and lens do not fit together"
     suspects = [f for f in findings if f["severity"] in ("critical", "warning")]
     mine, theirs = (None if metric is None else metric.of(a.estimate) for a in (best, answer))

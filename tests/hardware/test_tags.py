@@ -114,6 +114,19 @@ def test_untrustworthy_picture_is_refused_with_the_cure(picture, target, reason)
         tags.locate(picture(), CAMERA, target)
 
 
+@pytest.mark.parametrize("size", [(1, 1), (2, 2), (1000, 3), (3, 1000), (8, 8)])
+def test_picture_too_small_for_a_tag_shows_none(size):
+    camera = CameraModel(*size, CAMERA.K)
+    with pytest.raises(TagRefused, match="not in the picture"):
+        tags.locate(np.zeros((*size[::-1], 3), np.uint8), camera, TAG)
+
+
+@pytest.mark.parametrize("picture", [np.zeros((480, 640, 4), np.uint8), np.zeros((480, 640), np.float32)])
+def test_picture_of_another_kind_is_bad_input(picture):
+    with pytest.raises(InputError, match="RGB"):
+        tags.locate(picture, CAMERA, TAG)
+
+
 def test_wrong_camera_is_bad_input():
     with pytest.raises(InputError, match="640x480"):
         tags.locate(drawn(), CameraModel(320, 240, CAMERA.K), TAG)

@@ -147,3 +147,19 @@ def test_left_jacobian_is_the_mean_of_the_rotations_on_the_way(angle):
     nodes, weights = np.polynomial.legendre.leggauss(20)
     mean = np.einsum("n,nij->ij", weights / 2, se3.so3_exp((nodes[:, None] + 1) / 2 * phi))
     np.testing.assert_allclose(se3.left_jacobian(phi), mean, atol=1e-13 + 1e-9 * angle**2)
+
+
+def test_nearest_rotation_is_nearer_than_its_neighbours(rng):
+    for matrix in rng.normal(size=(20, 3, 3)):  # half of them are reflections
+        nearest = se3.nearest_rotation(matrix)
+        distance = np.linalg.norm(matrix - nearest)
+        others = np.concatenate(
+            [se3.so3_exp(rng.normal(0, 0.1, (50, 3))) @ nearest, se3.so3_exp(rng.normal(0, 2, (50, 3)))]
+        )
+        assert (np.linalg.norm(matrix - others, axis=(1, 2)) >= distance - 1e-12).all()
+
+
+@given(twist=twists)
+def test_quaternions_have_a_scalar_part_that_is_not_negative(twist):
+    assert se3.to_quat_xyzw(se3.exp(twist))[3] >= 0
+    assert se3.to_quat_wxyz(se3.exp(twist))[0] >= 0

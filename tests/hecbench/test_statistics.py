@@ -84,3 +84,7 @@ def test_fewer_than_five_values_have_no_interval(count):
     assert np.isnan(statistics.cluster_bootstrap(np.repeat(values, 3), np.repeat(np.arange(count), 3)).high)
     five = statistics.bootstrap(np.arange(5.0))
     assert five.low < five.value < five.high
+
+
+def test_root_mean_square():
+    assert statistics.root_mean_square([3.0, -4.0]) == pytest.approx(np.sqrt(12.5))

@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike
 
 from hecbench import se3
 from hecbench.se3 import Array
+from hecbench_hardware.controller_sim.dynamics import Dynamics
 from hecbench_hardware.controller_sim.geometry import pose_of, vector_of
 from hecbench_hardware.controller_sim.inputs_outputs import InputsOutputs
 from hecbench_hardware.controller_sim.signals import RobotMode, SafetyMode
@@ -49,6 +50,8 @@ class SimulatedArm:
         self._tcp_vector: list[float] = []
         self.moved = False
         self._speeds_before = self.joint_speeds
+        self._torques_of: tuple[object, ...] = (None,) * 4
+        self._torques: list[float] = []
         self.wrench = np.zeros(6)
         """Force and torque at the tool centre point in the base frame, since `zero_force`."""
         self.raw_wrench = np.zeros(6)
@@ -89,7 +92,10 @@ class SimulatedArm:
         """Stand still if nothing moved the arm; then feel and remember."""
         if not self.moved and self.joint_speeds.any():
             self.joint_speeds = np.zeros(6)
-        self.joint_accelerations = (self.joint_speeds - self._speeds_before) / self.dt_s
+        if self.joint_speeds is not self._speeds_before:
+            self.joint_accelerations = (self.joint_speeds - self._speeds_before) / self.dt_s
+        elif self.joint_accelerations.any():
+            self.joint_accelerations = np.zeros(6)
         self.history.append(self.joints)
         self._update_contact()
 
@@ -174,6 +180,31 @@ class SimulatedArm:
     def is_steady(self) -> bool:
         """Whether the arm stands."""
         return bool(np.abs(self.joint_speeds).max() < STEADY_RAD_S)
+
+    @property
+    def dynamics(self) -> Dynamics:
+        """Of the arm with its present payload."""
+        return Dynamics(self.arm, self.payload_kg, tuple(self.payload_cog_m))
+
+    @property
+    def torques(self) -> list[float]:
+        """Joint torques (6,) Nm of the present motion and of gravity, an estimate; kept while nothing changes."""
+        state = (self.joints, self.joint_speeds, self.joint_accelerations, self.payload_kg)
+        if any(now is not then for now, then in zip(state, self._torques_of, strict=True)):
+            dynamics = self.dynamics
+            torques = dynamics.gravity(self.joints, self.gravity)
+            torques += dynamics.coriolis(self.joints, self.joint_speeds)
+            if self.joint_accelerations.any():
+                torques += dynamics.mass_matrix(self.joints) @ self.joint_accelerations
+            self._torques_of, self._torques = state, torques.tolist()
+        return self._torques
+
+    def push(self, torques: Array) -> None:
+        """One cycle under joint torques (6,) Nm beyond those of gravity."""
+        require_finite("a torque", torques)
+        joints, speeds = self.dynamics.accelerate(self.joints, self.joint_speeds, torques, self.dt_s)
+        self.move(joints)
+        self.joint_speeds = speeds
 
     def zero_force(self) -> None:
         """Report forces from here on relative to the present one."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
@@ -24,21 +23,20 @@ class Answers:
 
     def __init__(self, script: ControlScript) -> None:
         self._script, self._arm = script, script.arm
-        unknown = partial(np.full, 6, np.nan)
         answers: dict[int, Callable[[], Array | list[float]]] = {
             26: lambda: [self._arm.dt_s],
             27: self._history,
             28: self._waypoint,
             30: lambda: self._inverse(script.doubles(6)),
-            38: unknown,
+            38: lambda: self._arm.torques,
             39: lambda: vector_of(script.pose(0) @ script.pose(6)),
             40: lambda: self._arm.tcp_offset,
             43: lambda: vector_of(self._arm.base_T_tcp),
             44: lambda: vector_of(self._arm.arm.forward(script.doubles(0)) @ script.pose(6)),
             46: lambda: self._inverse(self._arm.joints),
             58: lambda: vector_of(self._arm.arm.forward(self._arm.joints)),
-            67: partial(np.full, 36, np.nan),
-            68: unknown,
+            67: lambda: self._arm.dynamics.mass_matrix(self._arm.joints),
+            68: lambda: self._arm.dynamics.coriolis(self._arm.joints, self._arm.joint_speeds),
             69: lambda: self._arm.joint_accelerations,
             70: lambda: self._arm.jacobian().T,
             71: self._jacobian_rate,

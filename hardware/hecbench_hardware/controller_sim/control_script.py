@@ -9,7 +9,6 @@ from __future__ import annotations
 import re
 from collections.abc import Callable
 from functools import partial
-from math import nan
 from typing import Final
 
 import numpy as np
@@ -17,45 +16,42 @@ import numpy as np
 from hecbench.se3 import Array
 from hecbench_hardware.controller_sim.arm import ScriptError
 from hecbench_hardware.controller_sim.control_answers import Answers
+from hecbench_hardware.controller_sim.control_registers import ControlRegisters
 from hecbench_hardware.controller_sim.force import ForceTask
 from hecbench_hardware.controller_sim.geometry import pose_of, vector_of
 from hecbench_hardware.controller_sim.motions import Motion, brake, move_joints, move_linear
 from hecbench_hardware.controller_sim.program import Program, ProgramRunner, Watchdog
 
 READY, DONE = 1, 2
-MARK = "def rtde_control"
+NAME = "rtde_control"
+MARK = f"def {NAME}("
 """How the text of this script is known."""
 _LEAVE = 255
 _REPEATED: Final = frozenset({6, 9, 10, 11, 24, 25, 26, 27, 38, 58, *range(66, 72)})
 """Commands that the script runs in every cycle while their number stays in the register."""
 _HOLD_CYCLES = 10
 """How long a result stays after the client took its question back."""
-_FRESH_S = 0.01
-"""A repeated question that the client has not written for so long is over, so that the next one finds no answer."""
 _NUMBER = r"[-+0-9.eE]+"
 _MOVE = re.compile(rf"move([jlp])\((p?)\[([^\]]*)\],\s*a=({_NUMBER}),\s*v=({_NUMBER})")
 _SERVO_DECELERATION_RAD_S2 = 10.0
 
 
-class ControlScript:
+class ControlScript(ControlRegisters):
     """One run of the script."""
 
     def __init__(self, runner: ProgramRunner, text: str) -> None:
-        self.runner, self.arm = runner, runner.arm
         offset = re.search(r"# int register offset\n(\d+)", text)
-        self.offset = int(offset[1]) if offset else 0
+        super().__init__(runner, int(offset[1]) if offset else 0)
         injected = text.split("# inject move path\n", 1)[-1].split("\n    end", 1)[0]
         self._path = [
             (kind, bool(is_pose), np.array([float(x) for x in values.split(",")]), float(a), float(v))
             for kind, is_pose, values, a, v in _MOVE.findall(injected)
         ]
         self._threads: dict[str, Motion] = {}
-        self._writes = self._operation = 0
         self._servo_target = self._speed_target = self._speed_now = np.zeros(6)
         self._speed_acceleration = 0.0
         self._speed_of_tool = False
         self._shown_cycles = 0
-        self._shown: set[int] = set(range(6))
         self.waypoint: Array | None = None
         """Where the present motion goes, as a pose vector."""
         self.contact_cycles: int | None = None
@@ -66,8 +62,8 @@ class ControlScript:
     def run(self) -> Program:
         """The script's main loop beside its threads."""
         self.report_progress(None)
-        self._forget()
-        self._set_state(READY)
+        self.forget()
+        self.set_state(READY)
         main = self._loop()
         while True:
             for name, thread in list(self._threads.items()):
@@ -81,24 +77,24 @@ class ControlScript:
     def _loop(self) -> Motion:
         executed = False
         while True:
-            command = self.arm.io.inputs.ints[self._register(0)]
+            command = self.arm.io.inputs.ints[self.register(0)]
             if command == 0:
                 executed = False
                 self._shown_cycles += 1
-                if not self._shown or self._shown_cycles > _HOLD_CYCLES:
-                    self._forget()
-                    self._set_state(READY)
+                if not self.shown or self._shown_cycles > _HOLD_CYCLES:
+                    self.forget()
+                    self.set_state(READY)
             elif command == _LEAVE:
                 return
             elif command in _REPEATED:
-                if self._is_fresh():
+                if self.is_fresh():
                     yield from self._execute(command)
                 else:
-                    self._forget()
-                self._set_state(READY)
+                    self.forget()
+                self.set_state(READY)
             elif not executed:
                 yield from self._execute(command)
-                self._set_state(DONE)
+                self.set_state(DONE)
                 executed = True
             yield
 
@@ -149,58 +145,9 @@ class ControlScript:
             **dict.fromkeys((56, 57), lambda: setattr(arm, "external_sensor", self.integer(1) == 1)),
             59: lambda: setattr(arm, "gravity", d(0, 3).tolist()),
             62: lambda: setattr(self, "contact_cycles", 0),
+            66: lambda: arm.push(d(0)),
             65: self._set_payload,
         }
-
-    # registers
-
-    def _register(self, index: int) -> int:
-        return self.offset + index
-
-    def integer(self, index: int) -> int:
-        """An integer argument."""
-        return self.arm.io.inputs.ints[self._register(index)]
-
-    def doubles(self, first: int, count: int = 6) -> Array:
-        """Arguments (count,) of the command."""
-        start = self._register(first)
-        return np.array(self.arm.io.inputs.doubles[start : start + count])
-
-    def pose(self, first: int) -> Array:
-        """A pose argument (4, 4)."""
-        return pose_of(self.doubles(first))
-
-    def put(self, values: Array | list[float]) -> None:
-        """Show a result; from the 25th number on it goes on in the upper registers, as the script's does."""
-        for i, value in enumerate(np.ravel(values).tolist()):
-            index = i if i < 24 else i + 12
-            self.arm.io.outputs.doubles[self._register(index)] = value
-            self._shown.add(index)
-
-    def put_int(self, value: int) -> None:
-        """Show an integer result."""
-        self.arm.io.outputs.ints[self._register(1)] = value
-
-    def _forget(self) -> None:
-        for index in self._shown:
-            self.arm.io.outputs.doubles[self._register(index)] = nan
-        self._shown.clear()
-        self.put_int(0)
-
-    def _is_fresh(self) -> bool:
-        written = self.runner.input_written_s.get(f"input_int_register_{self._register(0)}", 0.0)
-        return self.runner.wall_s - written < _FRESH_S
-
-    def _set_state(self, state: int) -> None:
-        self.arm.io.outputs.ints[self._register(0)] = state
-
-    def report_progress(self, progress: int | None) -> None:
-        """Write the register of asynchronous motions; None means that none runs."""
-        self._writes = (self._writes + 1) % 128
-        if progress == 0:
-            self._operation = (self._operation + 1) % 128
-        running = 0 if progress is None else 1 << 15 | min(progress, 0x7FFF)
-        self.arm.io.outputs.ints[self._register(2)] = running | self._writes << 16 | self._operation << 24
 
     # motions
 
@@ -300,7 +247,7 @@ class ControlScript:
     def _set_watchdog(self) -> None:
         hertz = float(self.doubles(0, 1)[0])
         if hertz > 0:
-            name = f"input_int_register_{self._register(0)}"
+            name = f"input_int_register_{self.register(0)}"
             self.runner.watchdog = Watchdog(name, hertz, "stop", self.runner.wall_s)
 
     def _watch_contact(self) -> None:

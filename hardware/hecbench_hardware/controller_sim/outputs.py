@@ -1,5 +1,5 @@
 """The RTDE outputs of the simulated controller, by name. What the simulation has no physics for is constant:
-NaN where a value would pretend a measurement (currents, torques), nominal where it is a setting or a supply.
+NaN where a value would pretend a measurement (currents, momentum), nominal where it is a setting or a supply.
 """
 
 from __future__ import annotations
@@ -103,9 +103,7 @@ def _registers(direction: str) -> dict[str, Reader]:
 
 _NOT_MEASURED: Final = [
     "target_current",
-    "target_moment",
     "actual_current",
-    "actual_current_as_torque",
     "joint_control_output",
     "wrench_calc_from_currents",
     "actual_momentum",
@@ -124,6 +122,7 @@ _SIMULATED: Final[dict[str, Reader]] = {
     **dict.fromkeys(("actual_TCP_pose", "target_TCP_pose"), lambda p: p.arm.tcp_vector),
     **dict.fromkeys(("actual_TCP_speed", "target_TCP_speed"), lambda p: p.arm.tcp_speed),
     **dict.fromkeys(("actual_TCP_acceleration", "target_TCP_acceleration"), _tcp_acceleration),
+    **dict.fromkeys(("target_moment", "actual_current_as_torque"), lambda p: p.arm.torques),
     "actual_TCP_force": lambda p: p.arm.wrench.tolist(),
     "ft_raw_wrench": lambda p: p.arm.raw_wrench.tolist(),
     "tcp_force_scalar": lambda p: float(np.linalg.norm(p.arm.wrench[:3])),

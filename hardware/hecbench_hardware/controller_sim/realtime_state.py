@@ -27,7 +27,7 @@ _DOUBLES = (
 """How many numbers a frame has from each version on, the newest series first; each adds some at the end."""
 _OLDEST_DOUBLES = 130
 _UNKNOWN = [nan] * 6
-"""Currents and moments: no dynamics."""
+"""Currents."""
 
 
 def realtime_state(program: ProgramRunner, version: tuple[int, ...]) -> bytes:
@@ -41,7 +41,7 @@ def _numbers(program: ProgramRunner) -> tuple[float, ...]:
     joints, speeds = arm.joints.tolist(), arm.joint_speeds.tolist()
     pose, twist = arm.tcp_vector, arm.tcp_speed
     return (
-        *(arm.time_s, *joints, *speeds, *arm.joint_accelerations.tolist(), *_UNKNOWN, *_UNKNOWN),
+        *(arm.time_s, *joints, *speeds, *arm.joint_accelerations.tolist(), *_UNKNOWN, *arm.torques),
         *(*joints, *speeds, *_UNKNOWN, *_UNKNOWN, *pose, *twist, *arm.wrench.tolist(), *pose, *twist),
         *(arm.io.digital_inputs, *[TEMPERATURE_C] * 6, CYCLE_S, 0.0, arm.robot_mode),
         *(*[joint_mode(program)] * 6, arm.safety, *[0.0] * 6, *[nan] * 3, *[0.0] * 6),

@@ -46,7 +46,8 @@ def _dictionary(name: str) -> Any:
     return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, wanted))
 
 
-def _board(target: CharucoTarget) -> Any:
+def board_of(target: CharucoTarget) -> Any:
+    """OpenCV's object for the board; an `InputError` for a dictionary that it does not know."""
     import cv2
 
     size = target.columns, target.rows
@@ -58,7 +59,7 @@ def _board(target: CharucoTarget) -> Any:
 def _corners(grey: Grey, target: CharucoTarget) -> Array | None:
     import cv2
 
-    points, ids, _, _ = cv2.aruco.CharucoDetector(_board(target)).detectBoard(grey)
+    points, ids, _, _ = cv2.aruco.CharucoDetector(board_of(target)).detectBoard(grey)
     if ids is None or len(ids) == 0:
         return None
     corners = np.full((len(target.points_m), 2), np.nan)

@@ -95,7 +95,8 @@ class DRHeC:
         """Calibrate from the recording's start."""
         if recording.initial_parent_T_camera is None:
             raise Refusal("drhec needs a start: initial_parent_T_camera, or --init FILE")
-        _, views = prepare(recording)
+        robot, views = prepare(recording)
+        robot.check_start(recording)
         if not all(view.has_image for view in views):
             raise Refusal("drhec compares colours: every sample with joints needs an image")
         translator = registry.load().get(Kind.TRANSLATOR, self.translator, TranslatorSpec)

@@ -62,6 +62,7 @@ class EasyHeC:
                 "easyhec needs a start: initial_parent_T_camera, or --init FILE; easyhecpp needs none"
             )
         else:
+            robot.check_start(recording)
             start = se3.inverse(recording.initial_parent_T_camera)
         drawers = mask_drawers(robot.model, views, self.masks, self.backend)
         ceiling = 1.0 if self.masks == "per_link" else np.inf

@@ -57,6 +57,7 @@ class IPE:
         if recording.initial_parent_T_camera is None:
             raise Refusal("ipe needs a start: initial_parent_T_camera, or --init FILE")
         robot, views = prepare(recording)
+        robot.check_start(recording)
         drawers = mask_drawers(robot.model, views, "zbuffered", self.backend)
         numbers = Increment(se3.inverse(recording.initial_parent_T_camera))
         losses = _Losses([mask_of(view) for view in views], drawers, numbers, self.gamma)

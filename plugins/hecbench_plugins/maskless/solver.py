@@ -156,6 +156,8 @@ class Maskless:
         if set(self.unknown) - {Unknown.JOINTS}:
             raise Refusal("without masks only joint offsets can be solved for besides the camera: give masks")
         photographs = Photographs.of(recording)
+        if self.free is None:
+            photographs.robot.check_start(recording)
         if self.free is not None and photographs.background is None:
             raise Refusal(
                 f"without masks a start is found for a fixed camera in {scene_background.FEWEST_VIEWS} photographs or"

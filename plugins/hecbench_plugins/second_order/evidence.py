@@ -41,6 +41,8 @@ class FinalStage:
     extras: Mapping[str, Any] = field(default_factory=dict)
     covariance: Array | None = None
     """(6, 6) of the left perturbation of camera_T_parent when more than the camera was solved for."""
+    rivals: tuple[Array, ...] = ()
+    """camera_T_parent where other stages ended that explain the same evidence."""
 
 
 def overlap(views: Sequence[View], pose: Array, trace: Trace) -> float:
@@ -70,7 +72,7 @@ def answer(
 
     The covariance is the inverse Fisher information of the last comparison, Huber off, with the noise of its own
     residuals (Hartley and Zisserman 2004, section 5.2); correlated residuals count as fewer, and the errors of the
-    estimated colours are carried on.
+    estimated colours are carried on, and so is what stages that explain the same evidence disagree about.
     """
     camera_T_parent = end.descent.pose
     end.photometry.huber = np.inf
@@ -88,7 +90,7 @@ def answer(
         inverse = np.linalg.inv(information)
         if end.kind == "colour":
             inverse += inverse @ end.photometry.colour_information() @ inverse
-        seen_from_camera = (_ROUGHNESS * noise) ** 2 * inverse
+        seen_from_camera = (_ROUGHNESS * noise) ** 2 * inverse + _disagreement(end)
     parent_T_camera = se3.inverse(camera_T_parent)
     covariance = None
     if seen_from_camera is not None:
@@ -108,6 +110,12 @@ def answer(
         diagnostics=diagnostics,
         extras=end.extras,
     )
+
+
+def _disagreement(end: FinalStage) -> Array:
+    """Sum (6, 6) of d d' over the rivals, d the left perturbation of camera_T_parent from the end to a rival."""
+    moves = [se3.log(rival @ se3.inverse(end.descent.pose)) for rival in end.rivals]
+    return np.asarray(sum((np.outer(move, move) for move in moves), np.zeros((6, 6))))
 
 
 def told_path(steps: list[tuple[str, Array, float]]) -> list[list[Any]]:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench_plugins.second_order import kernels
-from hecbench_plugins.second_order.descent import SMALL_STEP, Trace
+from hecbench_plugins.second_order.descent import SMALL_STEP, Trace, draw_counted
 from hecbench_plugins.second_order.photometry import Photometry
 from hecbench_plugins.views.pyramid import Level, View
 
@@ -47,6 +47,12 @@ def between_pixels(
         if np.abs(move).max() < SMALL_STEP:
             break
     return pose, share
+
+
+def violated_share(views: Sequence[View], pose: Array, trace: Trace) -> float:
+    """The share of these intervals that the contour drawn at a pose violates; 1 where it is near none of them."""
+    found = [_violations(draw_counted(view, 1, pose, trace))[0] != 0 for view in views]
+    return float(np.concatenate(found).mean()) if sum(map(len, found)) else 1.0
 
 
 def _violations(at: Level) -> tuple[Array, Array]:

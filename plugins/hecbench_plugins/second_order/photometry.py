@@ -108,12 +108,11 @@ class Photometry:
         table[-1] = background
         image = renderer.image(table[:-1, :3], background[:3])[..., self.channels]
         observed = at.observed[..., self.channels]
-        box, slope = renderer.painted, self._slopes[index]
+        box, slope = self.box(at), self._slopes[index]
         if self.blur_px > 0:
             from scipy import ndimage
 
             sigma = (self.blur_px, self.blur_px, 0)
-            box = self._grown(box, image.shape)
             area = (slice(box[2], box[3] + 1), slice(box[0], box[1] + 1))
             blurred = image.copy()
             blurred[area] = ndimage.gaussian_filter(image[area], sigma, mode="nearest")
@@ -191,9 +190,12 @@ class Photometry:
         if at.hidden is not None:
             image[at.hidden] = at.background[self.channels]
 
-    def _grown(self, box: NDArray[np.int32], shape: tuple[int, ...]) -> NDArray[np.int32]:
-        by = int(np.ceil(4 * self.blur_px))
-        left, right, top, bottom = box
+    def box(self, at: Level) -> NDArray[np.int32]:
+        """Left, right, top, bottom px of what was drawn last and compared, blur included."""
+        if self.blur_px == 0:
+            return np.asarray(at.renderer.painted)
+        by, shape = int(np.ceil(4 * self.blur_px)), at.observed.shape
+        left, right, top, bottom = at.renderer.painted
         return np.array(
             [
                 max(0, left - by),

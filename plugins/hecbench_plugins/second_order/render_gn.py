@@ -2,8 +2,9 @@
 
 Coarse to fine on one CPU core: translation from centroid and area of the mask; the drawn contour against the
 signed distance of the mask's contour; the anti-aliased picture of flat parts, one colour per part estimated
-within the loop. Before a textured background the mask takes the place of the colours: its coverage, then the intervals
-between pixel centres through which its contour must pass.
+within the loop. Where parts are lit or the background is not uniform, and where the colours contradict an exact mask,
+the mask takes the place of the colours: its coverage, then the intervals between pixel centres through which its
+contour must pass.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ from hecbench.recording import CameraModel, Recording
 from hecbench.robots.posed import PosedRobot
 from hecbench_plugins.second_order import evidence
 from hecbench_plugins.second_order.descent import Trace, descend, draw_counted
-from hecbench_plugins.second_order.mask_intervals import between_pixels
+from hecbench_plugins.second_order.flatness import MOST_UNEVEN, unevenness
+from hecbench_plugins.second_order.mask_intervals import between_pixels, violated_share
 from hecbench_plugins.second_order.photometry import Photometry, tone_exponent
 from hecbench_plugins.second_order.silhouette import centroid_and_area, distances_at, silhouette_step
 from hecbench_plugins.second_order.unknowns import ExtendedPhotometry, Unknown, solve
@@ -57,6 +59,8 @@ class RenderGN:
         sure_overlap, least_overlap, least_contour: see above.
         most_violated: share of the contour beside the mask's changes above which the mask is not one of sampled
             pixels and the coverage alone decides.
+        most_more_violated: share of the contour by which the colours' end may violate more of such a mask than the
+            mask's own end does, which is about twice the contour's shift in px. Pixels on the edge differ by 0.02.
     """
 
     unknown: tuple[Unknown, ...] = ()
@@ -66,12 +70,14 @@ class RenderGN:
     least_overlap: float = 0.6
     least_contour: float = 2 / 3
     most_violated: float = 0.25
+    most_more_violated: float = 0.02
 
     def __call__(self, recording: Recording, *, rng: np.random.Generator) -> Estimate:
         """Calibrate from the recording's start, by given masks or those that a uniform background gives."""
         if recording.initial_parent_T_camera is None:
             raise Refusal("render_gn needs a start: initial_parent_T_camera, or --init FILE")
         robot, views = prepare(recording)
+        robot.check_start(recording)
         start = se3.inverse(recording.initial_parent_T_camera)
         trace = Trace()
         if any(self._camera_inside(view, start, trace) for view in views):
@@ -140,31 +146,60 @@ class RenderGN:
         return best
 
     def _refine(self, views: list[View], pose: Array, trace: Trace) -> evidence.FinalStage:
-        """Photometry where flat colours explain the pictures, else coverage and the intervals of the masks."""
-        if all(view.has_image and view.uniform_background for view in views):
-            for level, rounds in ((4, 8), (2, 8), (1, _MOST_ROUNDS)):
-                photometry = Photometry(views, level, slice(0, 3), self.huber, trace)
-                descent = descend(photometry, pose, rounds, trace, f"colour/{level}")
-                pose = descent.pose
-            exponent = tone_exponent(photometry)
-            if exponent != 1.0:
-                views = [linearised(view, exponent) for view in views]
-                photometry = Photometry(views, 1, slice(0, 3), self.huber, trace)
-                descent = descend(photometry, pose, _MOST_ROUNDS, trace, f"tone {exponent:.2f}/1")
-                pose = descent.pose
-            for blur in _BLURS_PX:
-                blurred = Photometry(views, 1, slice(0, 3), self.huber, trace, blur_px=blur)
-                if blurred(pose)[0] > descent.cost:
-                    break
-                descent = descend(blurred, pose, _MOST_ROUNDS, trace, f"blur {blur}/1")
-                pose, photometry = descent.pose, blurred
-            return evidence.FinalStage("colour", descent, photometry)
+        """Photometry where flat colours explain the pictures and contradict no given mask, else the masks.
+
+        A given mask is evidence: where the mask's own end shows it to be one of sampled pixels, the colours must
+        leave its contour where it is.
+        """
+        if not all(view.has_image and view.uniform_background for view in views):
+            return self._by_masks(views, pose, trace)
+        colour = self._by_colours(views, pose, trace)
+        colour.photometry(colour.descent.pose)
+        flat = unevenness(colour.photometry) <= MOST_UNEVEN
+        if not any(view.has_mask for view in views):
+            if flat:
+                return colour
+            raise SolverFailure("the parts of the robot are lit, or the background is uneven: give masks")
+        masks = self._by_masks(views, pose, trace)
+        if masks.kind != "intervals":
+            return colour if flat else masks
+        more = violated_share(views, colour.descent.pose, trace) - violated_share(
+            views, masks.descent.pose, trace
+        )
+        if more > self.most_more_violated:
+            return masks
+        return replace(colour, rivals=(*masks.rivals, masks.descent.pose))
+
+    def _by_colours(self, views: list[View], pose: Array, trace: Trace) -> evidence.FinalStage:
+        """One flat colour per part, coarse to fine, then the pictures' tone curve and blur."""
+        for level, rounds in ((4, 8), (2, 8), (1, _MOST_ROUNDS)):
+            photometry = Photometry(views, level, slice(0, 3), self.huber, trace)
+            descent = descend(photometry, pose, rounds, trace, f"colour/{level}")
+            pose = descent.pose
+        exponent = tone_exponent(photometry)
+        if exponent != 1.0:
+            views = [linearised(view, exponent) for view in views]
+            photometry = Photometry(views, 1, slice(0, 3), self.huber, trace)
+            descent = descend(photometry, pose, _MOST_ROUNDS, trace, f"tone {exponent:.2f}/1")
+            pose = descent.pose
+        for blur in _BLURS_PX:
+            blurred = Photometry(views, 1, slice(0, 3), self.huber, trace, blur_px=blur)
+            if blurred(pose)[0] > descent.cost:
+                break
+            descent = descend(blurred, pose, _MOST_ROUNDS, trace, f"blur {blur}/1")
+            pose, photometry = descent.pose, blurred
+        return evidence.FinalStage("colour", descent, photometry)
+
+    def _by_masks(self, views: list[View], pose: Array, trace: Trace) -> evidence.FinalStage:
+        """Coverage, then the intervals between pixel centres unless the mask is not one of sampled pixels."""
         coverage = Photometry(views, 1, slice(3, 4), self.huber, trace)
         descent = descend(coverage, pose, _MOST_ROUNDS, trace, "coverage/1")
         pose, violated = between_pixels(views, coverage, descent.pose, trace)
         if violated > self.most_violated:
             return evidence.FinalStage("coverage", descent, coverage)
-        return evidence.FinalStage("intervals", replace(descent, pose=pose), coverage)
+        return evidence.FinalStage(
+            "intervals", replace(descent, pose=np.asarray(pose)), coverage, rivals=(descent.pose,)
+        )
 
 
 def _calibrated(camera: CameraModel | None, found: Estimate) -> CameraModel:

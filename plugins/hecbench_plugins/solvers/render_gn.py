@@ -16,7 +16,8 @@ def render_gn(unknown: tuple[str, ...] = ()) -> Solver:
     from hecbench_plugins.second_order.unknowns import Unknown
 
     wanted = tuple(Unknown(name) for name in unknown)
-    return MasksElsePhotographs(RenderGN(unknown=wanted), Maskless(unknown=wanted))
+    photographs = Maskless(unknown=wanted)
+    return MasksElsePhotographs(RenderGN(unknown=wanted), photographs, photographs)
 
 
 def _unknowns(text: str) -> tuple[str, ...]:

@@ -18,7 +18,7 @@ def render_gn_free() -> Solver:
     from hecbench_plugins.start_search.by_masks import GuessFree
     from hecbench_plugins.start_search.view_sphere import ViewSphere
 
-    return MasksElsePhotographs(GuessFree(), Maskless(free=ViewSphere(spacing_deg=_SPACING_DEG)))
+    return MasksElsePhotographs(GuessFree(), Maskless(free=ViewSphere(spacing_deg=_SPACING_DEG)), Maskless())
 
 
 @hookimpl

@@ -33,7 +33,7 @@ class NoMask(Refusal):
 @lru_cache(maxsize=4)
 def meshes_by_level(model: RobotModel) -> dict[int, RenderMesh]:
     """The model's meshes by level; merged cells move no contour by more than a tenth of a level's pixel."""
-    return {level: RenderMesh.of(model, cell_m=cell_m) for level, cell_m in _COARSE_CELL_M.items()}
+    return {level: RenderMesh.cached(model, cell_m=cell_m) for level, cell_m in _COARSE_CELL_M.items()}
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +70,8 @@ class View:
     raw: Picture
     """(H, W, 3) undistorted, not cut by the mask."""
     has_image: bool
+    has_mask: bool
+    """Given, not found before a uniform background."""
     uniform_background: bool
 
 
@@ -169,7 +171,7 @@ def _view(
         for level in LEVELS
     }
     full = raw if raw is not None else np.zeros((*mask.shape, 3), np.float32)
-    return View(joints_rad, parent_T_link, levels, full, has_image, uniform)
+    return View(joints_rad, parent_T_link, levels, full, has_image, has_mask, uniform)
 
 
 def linearised(view: View, gamma: float) -> View:

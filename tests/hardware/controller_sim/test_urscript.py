@@ -142,17 +142,40 @@ def test_threads_take_turns(run):
     assert said[1:] == ["True", "-1"]
 
 
+def test_a_critical_section_is_not_interrupted_but_may_wait(run):
+    said = run("""
+ global n = 0
+ global seen = -1
+ thread watcher():
+   while True:
+     seen = n
+     sync()
+   end
+ end
+ run watcher()
+ enter_critical
+ while n < 1000:
+   n = n + 1
+ end
+ textmsg(seen)
+ sleep(0.01)
+ textmsg(seen)
+ exit_critical""")
+    assert said == ["-1", "1000"]
+
+
 @pytest.mark.parametrize(
     ("body", "complaint"),
     [
         (" x = y + 1", "line 2: the name 'y' is not defined"),
-        (" x = 1 / 0", "line 2: division by zero"),
+        (" x = 1 / 0", "line 2: 1 / 0: division by zero"),
         (" x = [1, 2]\n y = x[2]", "line 3: [1, 2] has no item 2"),
         (" if 1:\n end", "True or False, not 1"),
         (" movej([0, 0, 0])", "line 2: movej(): the joints must be 6 numbers"),
         (" movej([0, 0, 0, 0, 0, 0], q=1)", "movej() takes (q, a, v, t, r)"),
         (" movel()", "movel() needs 'pose'"),
         (' sin("a")', "sin(): it must be a number, not a"),
+        (" str_len(2)", "str_len(): it must be a text, not 2"),
         (" acos(2)", "acos(): math domain error"),
         (" movel(p[3, 0, 0, 0, 0, 0])", "unable to find an inverse kinematics solution"),
         (" write_output_integer_register(48, 1)", "a whole number from 0 to 47"),
@@ -270,6 +293,9 @@ def test_outputs_registers_and_settings(run, runner):
    textmsg(get_target_payload_cog())
  end""")
     io = runner.arm.io
+    run(" set_digital_out(9, True)\n textmsg(get_digital_out(9))\n set_tool_analog_input_domain(1, 0)")
+    assert io.analog_input_domains == [1, 1, 1, 0]
+    io.digital_outputs &= ~(1 << 17)
     assert io.digital_outputs == 1 << 3 | 1 << 5 | 1 << 9 | 1 << 16
     assert io.analog_outputs == [0.0, 0.25]
     assert io.tool_voltage == 24
@@ -278,7 +304,7 @@ def test_outputs_registers_and_settings(run, runner):
     assert io.outputs.doubles[3] == 1.0
     assert runner.arm.payload_kg == 1.5
     assert runner.arm.flange_T_tcp[2, 3] == pytest.approx(0.1)
-    assert runner.arm.log[-1].endswith("[0, 0, 0.03]")
+    assert any(line.endswith("[0, 0, 0.03]") for line in runner.arm.log)
 
 
 def test_gripper_functions(run, runner):

@@ -7,7 +7,17 @@ import pytest
 
 from hecbench import se3
 from hecbench.bundle.adjustment import _step, adjust, adjust_with_noise
-from hecbench.bundle.model import Noise, Problem, State, linearise, predict, robot_corrections, start
+from hecbench.bundle.model import (
+    Noise,
+    Problem,
+    State,
+    _huber_cost,
+    _huber_weights,
+    linearise,
+    predict,
+    robot_corrections,
+    start,
+)
 from hecbench.diagnose.fit import IdealCamera
 from hecbench.errors import SolverFailure
 from hecbench.recording import Mounting
@@ -161,3 +171,16 @@ def test_scale_is_found(mounting, rng):
     solution = adjust(problem, truth, Noise(0.3))
     assert solution.state.scale == pytest.approx(1.05, abs=1e-6)
     assert isinstance(solution.state, State)
+
+
+@pytest.mark.parametrize("limit", [1.5, 3.0])
+def test_the_robust_cost_is_continuous_and_its_weights_are_its_slope(limit):
+    norms = np.array([0.2, limit - 1e-7, limit + 1e-7, 10.0])
+    costs = [_huber_cost(np.array([norm]), limit) for norm in norms]
+    assert costs[1] == pytest.approx(costs[2], abs=1e-5)
+    step = 1e-5
+    for norm, weight in zip(norms[[0, 3]], _huber_weights(norms[[0, 3]], limit), strict=True):
+        slope = (
+            _huber_cost(np.array([norm + step]), limit) - _huber_cost(np.array([norm - step]), limit)
+        ) / (2 * step)
+        assert slope == pytest.approx(2 * weight * norm, rel=1e-6)

@@ -203,3 +203,16 @@ def test_a_cluster_gives_the_same_results(tmp_path):
 def test_a_scheduler_that_does_not_answer_is_named(tmp_path, executor):
     with pytest.raises(InputError, match="--executor"):
         runner.run(tasks(1), Options(), out=tmp_path, executor=executor)
+
+
+def test_solvers_of_other_names_and_seeds_draw_other_numbers(exact_rig):
+    def draws(recording, *, rng):
+        return Estimate(np.eye(4), diagnostics={"draw": rng.random()})
+
+    named = [replace(spec(draws), name=name) for name in ("one", "two")]
+    found = [
+        estimate.diagnostics["draw"]
+        for seed in (0, 1)
+        for estimate in solving.solve(exact_rig, named, Options(seed=seed, held_out=False))
+    ]
+    assert len(set(found)) == 4

@@ -1,5 +1,6 @@
 """Append-only files: a full disk is one line; what is there is kept."""
 
+import os
 from pathlib import Path
 
 import pytest
@@ -35,3 +36,20 @@ def test_full_disk_is_one_line():
         pytest.skip("there is no /dev/full")
     with pytest.raises(HecbenchError, match=r"cannot be written \(No space left"):
         append(full, ["one"])
+
+
+def test_a_line_that_does_not_fit_is_taken_back(tmp_path, monkeypatch):
+    path = tmp_path / "lines"
+    whole = os.write
+
+    def half(descriptor, content):
+        return whole(descriptor, content[: len(content) // 2])
+
+    with journal.writing(path, str.encode, resume=False, holds="lines", busy="busy") as writer:
+        writer.append(["first"])
+        monkeypatch.setattr(os, "write", half)
+        with pytest.raises(HecbenchError, match="is the disk full"):
+            writer.append(["second, which is longer"])
+        monkeypatch.undo()
+        writer.append(["third"])
+    assert path.read_bytes() == b"first\nthird\n"

@@ -1,6 +1,7 @@
 """The store: append-only, exclusive, and readable after any kind of death."""
 
 import multiprocessing
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -62,6 +63,7 @@ def test_cut_off_at_any_byte(tmp_path):
         contents = store.read(tmp_path)
         complete = sum(end - 1 <= length for end in ends)
         assert len(contents.estimates) == complete
+        assert store.keys(tmp_path) == {store.key(estimate) for estimate in contents.estimates}
         tail = length not in (0, *ends, *(end - 1 for end in ends))
         assert len(contents.damage) == tail
         if length:
@@ -78,6 +80,7 @@ def test_foreign_lines_are_named_and_skipped(tmp_path, junk):
     path.write_bytes(lines[0] + junk + lines[1])
     contents = store.read(tmp_path)
     assert len(contents.estimates) == 2
+    assert store.keys(tmp_path) == {store.key(estimate) for estimate in contents.estimates}
     assert ":2: damaged" in contents.damage[0]
 
 
@@ -108,3 +111,10 @@ def test_bad_places(tmp_path):
         write(tmp_path / "file" / "below", estimates(1))
     with pytest.raises(InputError, match=r"estimates.jsonl"):
         store.read(tmp_path / "nowhere")
+
+
+def test_results_of_two_seeds_are_two_results(tmp_path):
+    first, second = estimates(1)[0], estimates(1)[0]
+    second = replace(second, provenance={**second.provenance, "seed": 1})
+    write(tmp_path, [first, second])
+    assert len(store.read(tmp_path).estimates) == 2

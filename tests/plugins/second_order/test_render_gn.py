@@ -82,8 +82,8 @@ def test_views_are_stacked():
 
 def test_no_mask_and_calibrated_covariance(easy):
     rng = np.random.default_rng(5)
-    picture = easy.image(0) / 255 + rng.normal(0, 0.05, (480, 640, 3))
-    recording = replace(easy, images=(picture.astype(np.float32),), masks=None)
+    picture = 0.25 + easy.image(0) / 510 + rng.normal(0, 0.05, (480, 640, 3))
+    recording = replace(easy, images=(np.clip(picture, 0, 1).astype(np.float32),), masks=None)
     estimate = solve(recording)
     twist = se3.log(easy.truth_parent_T_camera @ se3.inverse(estimate.parent_T_camera))
     assert twist @ np.linalg.solve(estimate.covariance, twist) < 22.5  # 99.9 % of chi-squared with 6 degrees

@@ -17,6 +17,8 @@ Steps = Generator[None, None, Any]
 
 _STATEMENTS_PER_CYCLE = 400
 """What a thread may do in one cycle; the rest waits for the next, as on a processor that is busy."""
+_CRITICAL_STATEMENTS = 4000
+"""How much longer a critical section may go on."""
 _THREADS = 64
 
 
@@ -44,7 +46,7 @@ class Scheduler:
         self.current: Thread | None = None
         """The thread whose turn it is."""
         self.critical: Thread | None = None
-        """The thread that lets no other have a turn."""
+        """The thread that is not interrupted; what takes time lets the others have their turns all the same."""
 
     def take_turns(self, steps: Steps) -> Steps:
         """One turn of every thread per cycle; the program ends with its first thread."""
@@ -52,7 +54,7 @@ class Scheduler:
         try:
             while main.alive:
                 for thread in list(self._threads):
-                    if thread.alive and self.critical in (None, thread):
+                    if thread.alive:
                         self._turn(thread)
                 if main.alive:
                     yield
@@ -60,6 +62,11 @@ class Scheduler:
             pass
         finally:
             self.sockets.close()
+
+    def spend(self, thread: Thread) -> bool:
+        """Count a statement; true when the thread has to wait for the next cycle."""
+        thread.budget -= 1
+        return thread.budget < (-_CRITICAL_STATEMENTS if self.critical is thread else 0)
 
     def _turn(self, thread: Thread) -> None:
         self.current, thread.budget = thread, _STATEMENTS_PER_CYCLE

@@ -15,7 +15,8 @@ from hecbench_hardware.controller_sim.geometry import pose_of, vector_of
 Value = Any
 """bool, int, float, str, list of values, `Pose`, dict (a struct), `None` (what a procedure returns) or a thread."""
 
-TEXT_CHARACTERS, LIST_ITEMS = 1 << 16, 10_000
+TEXT_CHARACTERS, LIST_ITEMS = 1 << 14, 4096
+"""The longest text, and the most items of a list with all lists in it."""
 _EXACT_INT = 1 << 53
 
 
@@ -85,6 +86,20 @@ def truth(value: Value, what: str = "a condition") -> bool:
     return value
 
 
+def text(value: Value, what: str = "it") -> str:
+    """A text, or an error."""
+    if not isinstance(value, str):
+        raise ScriptError(f"{what} must be a text, not {text_of(value)}")
+    return value
+
+
+def whole(value: Value, what: str = "it") -> int:
+    """A whole number, or an error."""
+    if not isfinite(number(value, what)) or int(value) != value:
+        raise ScriptError(f"{what} must be a whole number, not {text_of(value)}")
+    return int(value)
+
+
 def text_of(value: Value) -> str:
     """As the controller writes it."""
     if isinstance(value, Pose):
@@ -108,20 +123,23 @@ def bounded(value: Value) -> Value:
         return float(value)
     if isinstance(value, str) and len(value) > TEXT_CHARACTERS:
         raise ScriptError(f"a text of more than {TEXT_CHARACTERS} characters")
-    if isinstance(value, list) and len(value) > LIST_ITEMS:
+    if isinstance(value, list | dict) and items_in(value) > LIST_ITEMS:
         raise ScriptError(f"a list of more than {LIST_ITEMS} items")
     return value
 
 
-def _divide(a: float, b: float) -> float:
-    if b == 0:
-        raise ScriptError("division by zero")
-    return a / b
+def items_in(value: Value) -> int:
+    """Items of a list or struct and of those within it; counted no further than is allowed."""
+    count, parts = 0, [value]
+    while parts and count <= LIST_ITEMS:
+        part = parts.pop()
+        inner = part.values() if isinstance(part, dict) else part
+        count += len(inner)
+        parts += [item for item in inner if isinstance(item, list | dict)]
+    return count
 
 
 def _modulo(a: float, b: float) -> float:
-    if b == 0:
-        raise ScriptError("division by zero")
     return int(fmod(a, b)) if isinstance(a, int) and isinstance(b, int) else fmod(a, b)
 
 
@@ -129,7 +147,7 @@ _ARITHMETIC: Final[dict[str, Callable[[Any, Any], Any]]] = {
     "+": lambda a, b: a + b,
     "-": lambda a, b: a - b,
     "*": lambda a, b: a * b,
-    "/": _divide,
+    "/": lambda a, b: a / b,
     "%": _modulo,
 }
 _ORDER: Final[dict[str, Callable[[Any, Any], bool]]] = {
@@ -152,7 +170,10 @@ def combine(operator: str, a: Value, b: Value) -> Value:
             return _ORDER[operator](a, b)
         raise ScriptError(f"'{operator}' needs numbers, not {text_of(a)} and {text_of(b)}")
     if is_number(a) and is_number(b):
-        return bounded(_ARITHMETIC[operator](a, b))
+        try:
+            return bounded(_ARITHMETIC[operator](a, b))
+        except (ArithmeticError, ValueError) as error:
+            raise ScriptError(f"{text_of(a)} {operator} {text_of(b)}: {error}") from None
     if isinstance(a, str) and isinstance(b, str) and operator == "+":
         return bounded(a + b)
     return _combine_lists(operator, a, b)
@@ -172,10 +193,10 @@ def _combine_lists(operator: str, a: Value, b: Value) -> Value:
 
 def item_of(holder: Value, index: Value) -> Value:
     """`holder[index]`."""
-    whole = int(index) if isinstance(index, int | float) and not isinstance(index, bool) else -1
-    if not isinstance(holder, list) or whole != index or not 0 <= whole < len(holder):
-        raise ScriptError(f"{text_of(holder)} has no item {text_of(index)}")
-    return holder[whole]
+    at = whole(index, "an index")
+    if not isinstance(holder, list) or not 0 <= at < len(holder):
+        raise ScriptError(f"{text_of(holder)} has no item {at}")
+    return holder[at]
 
 
 def pose_from(items: list[Value]) -> Pose:

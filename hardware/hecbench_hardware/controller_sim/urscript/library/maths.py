@@ -26,7 +26,7 @@ def _of_one(name: str, function: Callable[[float], float]) -> Builtin:
 
 def norm(_: Machine, a: Value) -> float:
     """The absolute value of a number, the length of a list."""
-    return abs(a) if is_number(a) else float(np.linalg.norm(vector(a, len(a), "the list")))
+    return abs(a) if is_number(a) else math.hypot(*vector(a, len(a), "the list"))
 
 
 def atan2(_: Machine, x: Value, y: Value) -> float:

@@ -138,6 +138,18 @@ def stopl(m: Machine, a: Value, aRot: Value = "a") -> Motion:
     return brake(m.arm, number(a) * fastest / speed if speed > 1e-6 else number(a))
 
 
+def direct_torque(
+    m: Machine,
+    torque: Value,
+    friction_comp: Value = True,
+    viscous_scale: Value = None,
+    coulomb_scale: Value = None,
+) -> Motion:
+    """Joint torques beyond those of gravity, for one cycle; the friction of the drives is not compensated."""
+    m.arm.push(vector(torque, 6, "torque"))
+    yield
+
+
 def sleep(m: Machine, t: Value) -> Motion:
     """Wait, in the controller's time."""
     end = m.arm.time_s + number(t)
@@ -206,6 +218,7 @@ FUNCTIONS: Final = builtins(
     speedl,
     stopj,
     stopl,
+    direct_torque,
     sleep,
     sync,
     force_mode,

@@ -11,7 +11,7 @@ from hecbench_hardware.controller_sim.arm import ScriptError
 from hecbench_hardware.controller_sim.urscript.functions import builtins
 from hecbench_hardware.controller_sim.urscript.machine import Machine
 from hecbench_hardware.controller_sim.urscript.sockets import SOCKETS, TcpConnection
-from hecbench_hardware.controller_sim.urscript.values import Value, number, text_of
+from hecbench_hardware.controller_sim.urscript.values import Value, number, text, text_of, truth, whole
 
 Waiting = Generator[None, None, Any]
 
@@ -25,7 +25,7 @@ def socket_open(m: Machine, address: Value, port: Value, socket_name: Value = _N
     """Whether a connection stands; only to this computer."""
     if len(m.sockets) >= SOCKETS and socket_name not in m.sockets:
         raise ScriptError(f"more than {SOCKETS} sockets")
-    connection = m.sockets.connect(address, int(port))
+    connection = m.sockets.connect(text(address, "address"), whole(port, "port"))
     if connection is None:
         m.arm.note(f"socket_open({address}, {port}): only this computer's own addresses are simulated")
         return False
@@ -56,22 +56,22 @@ def socket_send_line(m: Machine, str_: Value, socket_name: Value = _NAME) -> boo
 
 def socket_send_int(m: Machine, value: Value, socket_name: Value = _NAME) -> bool:
     """Four bytes, the highest first."""
-    return m.sockets.send(socket_name, struct.pack(">I", int(number(value)) & 0xFFFFFFFF))
+    return m.sockets.send(socket_name, struct.pack(">I", whole(value) & 0xFFFFFFFF))
 
 
 def socket_send_byte(m: Machine, value: Value, socket_name: Value = _NAME) -> bool:
     """One byte."""
-    return m.sockets.send(socket_name, bytes([int(number(value)) & 0xFF]))
+    return m.sockets.send(socket_name, bytes([whole(value) & 0xFF]))
 
 
 def socket_set_var(m: Machine, name: Value, value: Value, socket_name: Value = _NAME) -> bool:
     """The line `SET name value`."""
-    return m.sockets.send(socket_name, f"SET {name} {int(number(value))}\n".encode())
+    return m.sockets.send(socket_name, f"SET {text(name)} {whole(value)}\n".encode())
 
 
 def socket_get_var(m: Machine, name: Value, socket_name: Value = _NAME) -> Waiting:
     """The number that answers the line `GET name`."""
-    m.sockets.send(socket_name, f"GET {name}\n".encode())
+    m.sockets.send(socket_name, f"GET {text(name)}\n".encode())
     line = yield from _awaited(m, socket_name, _READ_S, _through(b"\n"))
     words = line.decode(errors="replace").split()
     return int(words[1]) if len(words) == 2 and words[1].lstrip("-").isdecimal() else 0
@@ -92,10 +92,12 @@ def socket_read_string(
     timeout: Value = _READ_S,
 ) -> Waiting:
     """What arrived, or what stands between a prefix and a suffix; empty after the time-out."""
-    end = suffix.replace("\\n", "\n").replace("\\r", "\r") if interpret_escape else suffix
+    end, begin = text(suffix, "suffix"), text(prefix, "prefix")
+    if truth(interpret_escape, "interpret_escape"):
+        end = end.replace("\\n", "\n").replace("\\r", "\r")
     found = yield from _awaited(m, socket_name, number(timeout), _through(end.encode()) if end else len)
-    text = found.decode(errors="replace")
-    return text.partition(prefix)[2].removesuffix(end) if prefix else text.removesuffix(end)
+    content = found.decode(errors="replace").removesuffix(end) if end else found.decode(errors="replace")
+    return content.partition(begin)[2] if begin else content
 
 
 def socket_read_byte_list(
@@ -133,7 +135,7 @@ def socket_read_ascii_float(
 def _count(value: Value) -> int:
     if not 0 < number(value, "the count") <= _NUMBERS:
         raise ScriptError(f"1 to {_NUMBERS} values can be read at once, not {text_of(value)}")
-    return int(value)
+    return whole(value, "the count")
 
 
 def _exactly(count: int) -> Callable[[bytes], int]:

@@ -122,9 +122,11 @@ _READINGS: Final[dict[str, Callable[[Machine], Any]]] = {
     "get_tcp_force": lambda m: m.arm.wrench.tolist(),
     "force": lambda m: float(np.linalg.norm(m.arm.wrench[:3])),
     "get_tcp_offset": lambda m: Pose(m.arm.tcp_offset.tolist()),
-    "get_joint_torques": lambda _: [nan] * 6,
-    "get_coriolis_and_centrifugal_torques": lambda _: [nan] * 6,
-    "get_mass_matrix": lambda _: [[nan] * 6 for _ in range(6)],
+    "get_joint_torques": lambda m: list(m.arm.torques),
+    "get_coriolis_and_centrifugal_torques": lambda m: m.arm.dynamics.coriolis(
+        m.arm.joints, m.arm.joint_speeds
+    ).tolist(),
+    "get_mass_matrix": lambda m: m.arm.dynamics.mass_matrix(m.arm.joints).tolist(),
     "get_tool_accelerometer_reading": lambda _: [nan] * 3,
     "get_tool_current": lambda _: nan,
     "get_controller_temp": lambda _: TEMPERATURE_C,

@@ -10,7 +10,7 @@ from hecbench_hardware.controller_sim.inputs_outputs import BANKS, TOOL_VOLTAGES
 from hecbench_hardware.controller_sim.signals import BITS, REGISTERS
 from hecbench_hardware.controller_sim.urscript.functions import Builtin, builtins
 from hecbench_hardware.controller_sim.urscript.machine import Machine
-from hecbench_hardware.controller_sim.urscript.values import Value, number, truth
+from hecbench_hardware.controller_sim.urscript.values import Value, number, truth, whole
 
 _TOOL_PORT = 8
 """`set_digital_out` counts the tool's terminals from here."""
@@ -22,7 +22,7 @@ def _terminal(bank: str, n: Value, what: str = "n") -> int:
 
 
 def _whole(n: Value, count: int, what: str) -> int:
-    if not 0 <= number(n, what) < count or int(n) != n:
+    if not 0 <= whole(n, what) < count:
         raise ScriptError(f"{what} must be a whole number from 0 to {count - 1}, not {n}")
     return int(n)
 
@@ -63,6 +63,32 @@ def set_analog_inputrange(m: Machine, port: Value, range_: Value) -> None:
     m.arm.io.analog_input_domains[_whole(port, 4, "port")] = _whole(range_, 5, "range")
 
 
+def set_standard_analog_input_domain(m: Machine, port: Value, domain: Value) -> None:
+    """0 current, 1 voltage."""
+    m.arm.io.analog_input_domains[_whole(port, 2, "port")] = _whole(domain, 2, "domain")
+
+
+def set_tool_analog_input_domain(m: Machine, port: Value, domain: Value) -> None:
+    """0 current, 1 voltage."""
+    m.arm.io.analog_input_domains[2 + _whole(port, 2, "port")] = _whole(domain, 2, "domain")
+
+
+def get_digital_in(m: Machine, n: Value) -> bool:
+    """A standard input, or from 8 on one of the tool."""
+    first = _TOOL_PORT if number(n, "n") >= _TOOL_PORT else 0
+    return _bit(m.arm.io.digital_inputs, "tool" if first else "standard", n - first)
+
+
+def get_digital_out(m: Machine, n: Value) -> bool:
+    """A standard output, or from 8 on one of the tool."""
+    first = _TOOL_PORT if number(n, "n") >= _TOOL_PORT else 0
+    return _bit(m.arm.io.digital_outputs, "tool" if first else "standard", n - first)
+
+
+def _bit(bits: int, bank: str, n: Value) -> bool:
+    return bool(bits >> BANKS[bank][0] + _terminal(bank, n) & 1)
+
+
 def set_tool_voltage(m: Machine, voltage: Value) -> None:
     """0, 12 or 24 V."""
     if voltage not in TOOL_VOLTAGES:
@@ -77,11 +103,8 @@ def set_runstate_outputs(m: Machine, outputs: Value) -> None:
 
 
 def _of_bank(name: str, bank: str, kind: str) -> Builtin:
-    first = BANKS[bank][0]
-
     def read(m: Machine, n: Value) -> bool:
-        bits: int = getattr(m.arm.io, f"digital_{kind}puts")
-        return bool(bits >> first + _terminal(bank, n) & 1)
+        return _bit(getattr(m.arm.io, f"digital_{kind}puts"), bank, n)
 
     return Builtin(name, read, (("n", Builtin.REQUIRED),))
 
@@ -142,7 +165,6 @@ def _families() -> dict[str, Builtin]:
             name = f"get_{bank}_digital_{kind}"
             found[name] = _of_bank(name, bank, kind)
     for kind in ("in", "out"):
-        found[f"get_digital_{kind}"] = _of_bank(f"get_digital_{kind}", "standard", kind)
         for prefix in ("get", "get_standard"):
             found[f"{prefix}_analog_{kind}"] = _analog(f"{prefix}_analog_{kind}", kind, 0)
     found["get_tool_analog_in"] = _analog("get_tool_analog_in", "in", 2)
@@ -158,6 +180,10 @@ FUNCTIONS: Final = {
     **_families(),
     **builtins(
         set_digital_out,
+        get_digital_in,
+        get_digital_out,
+        set_standard_analog_input_domain,
+        set_tool_analog_input_domain,
         set_flag,
         get_flag,
         set_standard_analog_out,

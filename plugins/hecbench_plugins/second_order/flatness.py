@@ -1,0 +1,61 @@
+"""Whether the parts and the background of pictures are flat: the comparison of colours knows nothing else."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hecbench_plugins.second_order.photometry import Photometry
+
+_APART_PX = 3
+"""Noise of neighbours that demosaicing and compression have mixed is independent at this distance."""
+_SURE = 3.0
+"""Standard errors by which shading must exceed what noise alone would show."""
+MOST_UNEVEN = 0.005
+"""Of [0, 1]: a good step of 8-bit pictures. Flat drawings with noise of 0.05 stay below it, a lit arm has 0.05."""
+
+
+def unevenness(photometry: Photometry) -> float:
+    """Standard deviation, in [0, 1], of what is left of shading in parts or background at the pictures drawn last.
+
+    Residuals inside a region, away from every edge, are noise where the region is flat; what they share with those
+    `_APART_PX` beside them is shading, texture or mottling. The largest value over views and both regions.
+    """
+    worst = 0.0
+    for view, residual in zip(photometry.views, photometry.residuals, strict=True):
+        at = view.levels[photometry.level]
+        box = photometry.box(at)
+        area = (slice(box[2], box[3] + 1), slice(box[0], box[1] + 1))
+        part = at.renderer.part[area]
+        inner = _inner(part)
+        if at.hidden is not None:
+            inner &= ~at.hidden[area]
+        for region in (inner & (part < 0), inner & (part >= 0)):
+            worst = max(worst, _shared(residual, region))
+    return float(np.sqrt(worst))
+
+
+def _inner(part: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """Pixels (h, w) in whose neighbourhood only one part is drawn."""
+    from scipy import ndimage
+
+    width = 2 * _APART_PX + 1
+    return np.asarray(ndimage.maximum_filter(part, width) == ndimage.minimum_filter(part, width))
+
+
+def _shared(residual: NDArray[np.float32], region: NDArray[np.bool_]) -> float:
+    """The variance that pixels of a region share with those beside them, less what noise may feign."""
+    if not region.any():
+        return 0.0
+    centred = residual - residual[region].mean(0)
+    worst = 0.0
+    for one, other in (
+        ((slice(None), slice(_APART_PX, None)), (slice(None), slice(None, -_APART_PX))),
+        ((slice(_APART_PX, None),), (slice(None, -_APART_PX),)),
+    ):
+        both = region[one] & region[other]
+        if not both.any():
+            continue
+        products = (centred[one] * centred[other])[both].mean(-1)
+        worst = max(worst, float(products.mean() - _SURE * products.std() / np.sqrt(len(products))))
+    return worst
