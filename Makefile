@@ -40,10 +40,12 @@ bench: .venv/dev
 
 .venv/base: .venv/bin/python pyproject.toml constraints.txt
 	$(BIN)/pip install --quiet --constraint constraints.txt --editable .
+	$(BIN)/hecbench doctor --warm >/dev/null
 	touch $@
 
 .venv/dev: .venv/bin/python pyproject.toml constraints.txt
 	$(BIN)/pip install --quiet --constraint constraints.txt --editable '.[dev]'
+	$(BIN)/hecbench doctor --warm >/dev/null
 	touch $@ .venv/base
 
 .venv/docs: .venv/bin/python pyproject.toml constraints.txt

@@ -57,10 +57,18 @@ def read_bytes(path: Path) -> bytes:
     Raises:
         InputError: it is missing, unreadable or no regular file.
     """
+    with reading(path) as stream:
+        return stream.read()
+
+
+@contextmanager
+def reading(path: Path) -> Iterator[IO[bytes]]:
+    """Open a regular file; errors as for `read_bytes`."""
     try:
         if path.exists() and not path.is_file():
             raise InputError(f"{path}: cannot be read (it is no regular file); give a file")
-        return path.read_bytes()
+        with path.open("rb") as stream:
+            yield stream
     except FileNotFoundError:
         raise InputError(f"{path}: does not exist; check the path") from None
     except OSError as error:

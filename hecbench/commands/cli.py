@@ -22,6 +22,7 @@ from hecbench.commands.calibrate import calibrate
 from hecbench.commands.robot import robot
 from hecbench.commands.run import demo, run
 from hecbench.commands.solve import solve
+from hecbench.commands.view import view
 from hecbench.errors import HecbenchError, InputError
 
 COMMAND_GROUP = "hecbench.commands"
@@ -83,7 +84,7 @@ def cli() -> None:
     """Calibrate hand-eye rigs with every method, measure all by the same rulers, and report."""
 
 
-for _verb in (calibrate, demo, robot, run, solve):
+for _verb in (calibrate, demo, robot, run, solve, view):
     cli.add_command(_verb)
 
 
@@ -154,9 +155,15 @@ def conformance(name: str, kind: str | None, as_json: bool) -> None:
 
 
 @cli.command()
+@click.option("--warm", is_flag=True, help="Compile now what the first calibration would have to wait for.")
 @choices.as_json
-def doctor(as_json: bool) -> None:
+def doctor(warm: bool, as_json: bool) -> None:
     """Say what is installed, what is missing and how to get it."""
+    if warm:
+        from hecbench.commands.warming import warm as warmed
+
+        for part in warmed():
+            console.say(f"{part.subject}: {part.seconds:.1f} s")
     from hecbench.commands import doctor as examination
     from hecbench.report.tables import Table
 

@@ -130,6 +130,25 @@ def rasterise(screen, faces, front, order, nearness, face, box):
 
 
 @_jit
+def see(scene, sight, camera_T_parent, parent_T_link):
+    """What `Renderer.rasterise` does at poses of the links (L, 4, 4) behind a pose (4, 4), for other compiled loops.
+
+    `scene` and `sight` are those of a `Renderer`.
+    """
+    vertices, vertex_start, planes, face_start, faces, K = scene
+    camera_T_link, screen, front, order, nearness, face, box = sight
+    for link in range(len(parent_T_link)):
+        for i in range(3):
+            for j in range(4):
+                total = 0.0
+                for k in range(4):
+                    total += camera_T_parent[i, k] * parent_T_link[link, k, j]
+                camera_T_link[link, i, j] = total
+    project(vertices, vertex_start, planes, face_start, camera_T_link, K, screen, front)
+    return rasterise(screen, faces, front, order, nearness, face, box)
+
+
+@_jit
 def _span(w0, w0x, w1, w1x, x0, x1):
     """Columns between which all three barycentric weights can be positive, one pixel generous."""
     low, high = _ZERO, np.float32(x1 - x0)

@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
+import hashlib
+import io
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
+from hecbench.cache import Cache
 from hecbench.errors import InputError
 from hecbench.robots.meshes import Part
 from hecbench.robots.model import RobotModel
 
 Float = NDArray[np.float32]
 Int = NDArray[np.int32]
+
+_KEPT = Cache("meshes.sqlite", most_bytes=512 * 2**20)
 
 WELD_M = 1e-6
 FLAT_M = 1e-9
@@ -94,6 +100,27 @@ class RenderMesh:
             part_names=tuple(part.name for part in parts),
             error_m=max(link.moved for link in welded),
         )
+
+    @staticmethod
+    def cached(model: RobotModel, *, cell_m: float = 0.0) -> RenderMesh:
+        """The same as `of`, kept in the user's cache folder by the parts' content."""
+        digest = hashlib.sha256(Path(__file__).read_bytes())
+        digest.update(repr((model.name, model.links, cell_m)).encode())
+        for part in model.parts:
+            digest.update(repr((part.name, part.link, part.colour, part.vertices.shape)).encode())
+            digest.update(np.ascontiguousarray(part.vertices).data)
+            digest.update(np.ascontiguousarray(part.faces).data)
+        key = digest.digest()
+        if (kept := _KEPT.get(key)) is not None:
+            with np.load(io.BytesIO(kept), allow_pickle=False) as arrays:
+                held = dict(arrays)
+            names, error_m = tuple(held.pop("part_names").tolist()), float(held.pop("error_m"))
+            return RenderMesh(**held, part_names=names, error_m=error_m)
+        mesh = RenderMesh.of(model, cell_m=cell_m)
+        stream = io.BytesIO()
+        np.savez(stream, **{item.name: getattr(mesh, item.name) for item in fields(mesh)})
+        _KEPT.put({key: stream.getvalue()})
+        return mesh
 
     def scaled(self, frame_T_link: NDArray[np.float64], scale: NDArray[np.float64]) -> RenderMesh:
         """The robot stretched by `scale` (3,) along the axes of a frame, at one configuration (L, 4, 4)."""

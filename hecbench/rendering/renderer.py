@@ -8,6 +8,7 @@ derivative agree and only a few thousand pixels matter.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -120,6 +121,32 @@ class Renderer:
         self._derived = self.box.copy()
         self.nearness = np.zeros(shape, np.float32)
         self.face = np.full(shape, -1, np.int32)
+
+    @property
+    def scene(self) -> tuple[Float | Int, ...]:
+        """What `kernels.see` draws: the mesh and the camera."""
+        mesh = self.mesh
+        return (
+            mesh.vertices,
+            mesh.vertex_start,
+            mesh.planes,
+            mesh.face_start,
+            mesh.faces,
+            self._intrinsics,
+        )
+
+    @property
+    def sight(self) -> tuple[NDArray[Any], ...]:
+        """What `kernels.see` writes to; the last three are `nearness`, `face` and `box`."""
+        return (
+            self._camera_T_link,
+            self._screen,
+            self._front,
+            self._order,
+            self.nearness,
+            self.face,
+            self.box,
+        )
 
     def scale_focal(self, factor: float) -> None:
         """From now on draw with both focal lengths (and the skew) `factor` times those of K."""

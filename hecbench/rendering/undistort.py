@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import map_coordinates
 
 from hecbench.errors import InputError
 from hecbench.lens import distort
@@ -46,6 +45,8 @@ class Undistortion:
         values = np.asarray(picture, np.float32) * np.float32(scale)
         if self._source is None:
             return values
+        from scipy.ndimage import map_coordinates
+
         planes = values.reshape(*values.shape[:2], -1)
         resampled = [
             map_coordinates(planes[..., c], self._source, order=1, mode="constant")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -64,7 +65,7 @@ def _text(path: Path) -> str:
 
 def libraries_of(obj: str) -> list[str]:
     """The material files that an OBJ file names; a name may hold blanks."""
-    names = [line.strip()[7:].strip() for line in obj.splitlines() if line.strip().startswith("mtllib ")]
+    names = [name.strip() for name in re.findall(r"(?m)^[ \t]*mtllib ([^\r\n]*)", obj)]
     return [word for name in names for word in ([name] if name.count(".") < 2 else name.split())]
 
 

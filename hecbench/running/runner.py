@@ -69,10 +69,10 @@ def execute(task: Task, options: Options) -> tuple[list[Estimate], Evidence | No
     return estimates, evidence_from(recording, ready, diagnose.check(recording, ready))
 
 
-def remaining(tasks: Iterable[Task], done: Iterable[Estimate], options: Options) -> list[Task]:
+def remaining(tasks: Iterable[Task], done: set[store.Key], options: Options) -> list[Task]:
     """The tasks without the solvers that already have a result of the same place, content, seed and masks."""
-    finished = {store.key(estimate)[:3] + store.key(estimate)[4:] for estimate in done}
-    contents = {store.key(estimate)[3] for estimate in done}
+    finished = {key[:3] + key[4:] for key in done}
+    contents = {key[3] for key in done}
 
     def missing(task: Task) -> tuple[str, ...]:
         place = task.suite or "files", task.level, task.item
@@ -80,8 +80,12 @@ def remaining(tasks: Iterable[Task], done: Iterable[Estimate], options: Options)
             return task.solvers
         return tuple(s for s in task.solvers if (*place, s, options.seed, options.segmenter) not in finished)
 
-    pruned = (replace(task, solvers=missing(task)) for task in tasks)
-    return [task for task in pruned if task.solvers]
+    pairs = ((task, missing(task)) for task in tasks)
+    return [
+        task if solvers == task.solvers else replace(task, solvers=solvers)
+        for task, solvers in pairs
+        if solvers
+    ]
 
 
 def run(
@@ -102,7 +106,7 @@ def run(
         HecbenchError: the store cannot be written.
     """
     with store.writing(out, resume=resume) as writer:
-        done = store.read(out).estimates
+        done = store.keys(out)
         for estimates, found in _executed(remaining(tasks, done, options), options, jobs, executor):
             if found is not None:
                 evidence.save(found, out)

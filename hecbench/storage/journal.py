@@ -25,9 +25,10 @@ def lines(path: Path) -> Iterator[tuple[int, bytes]]:
     Raises:
         InputError: the file is missing or unreadable.
     """
-    for number, line in enumerate(files.read_bytes(path).split(b"\n"), start=1):
-        if line.strip():
-            yield number, line
+    with files.reading(path) as stream:
+        for number, line in enumerate(stream, start=1):
+            if not line.isspace():
+                yield number, line.removesuffix(b"\n")
 
 
 class Writer(Generic[T]):

@@ -28,6 +28,50 @@ def key(estimate: Estimate) -> Key:
     return *place, *run, provenance.get("masks")
 
 
+class _Provenance(msgspec.Struct, gc=False):
+    recording_sha256: str | None = None
+    seed: int | None = None
+    masks: str | None = None
+
+
+class _Label(msgspec.Struct, gc=False):
+    """What `key` needs of a line; all else is passed over."""
+
+    solver: str
+    provenance: _Provenance
+    suite: str | None = None
+    level: str | None = None
+    item: str | None = None
+
+
+def keys(folder: Path) -> set[Key]:
+    """The keys of what a store holds, in a tenth of the time and memory of `read`.
+
+    Raises:
+        InputError: there is no store in the folder.
+    """
+    decoder = msgspec.json.Decoder(_Label)
+    found: set[Key] = set()
+    for _, line in journal.lines(_file(folder)):
+        try:
+            label = decoder.decode(line)
+        except (msgspec.DecodeError, UnicodeDecodeError):
+            continue  # damaged: `read` says so, and the result is made again
+        run = label.provenance
+        place = label.suite, label.level, label.item
+        found.add((*place, str(run.recording_sha256), label.solver, run.seed, run.masks))
+    return found
+
+
+def _file(folder: Path) -> Path:
+    path = folder / FILE_NAME
+    if not folder.is_dir() or not path.exists():
+        raise InputError(
+            f"{folder}: holds no results ({FILE_NAME}); make some with `hecbench run --out {folder}`"
+        )
+    return path
+
+
 @dataclass(frozen=True)
 class Contents:
     """What a store holds.
@@ -47,11 +91,7 @@ def read(folder: Path) -> Contents:
     Raises:
         InputError: there is no store in the folder.
     """
-    path = folder / FILE_NAME
-    if not folder.is_dir() or not path.exists():
-        raise InputError(
-            f"{folder}: holds no results ({FILE_NAME}); make some with `hecbench run --out {folder}`"
-        )
+    path = _file(folder)
     estimates: dict[Key, Estimate] = {}
     damage = []
     for number, line in journal.lines(path):

@@ -55,10 +55,10 @@ class Ball:
         return np.array([self.centre_m] * 3 + [self.turn_rad] * 3)
 
     def pose(self, start: Array, x: Array) -> Array:
-        """parent_T_camera (4, 4) whose centre is moved by x[:3] m in the parent's frame and that is turned by the
-        rotation vector x[3:] rad in its own.
+        """parent_T_camera (..., 4, 4) whose centre is moved by x[..., :3] m in the parent's frame and that is turned by
+        the rotation vector x[..., 3:] rad in its own.
         """
-        return se3.make(start[:3, :3] @ se3.so3_exp(x[3:]), start[:3, 3] + x[:3])
+        return se3.make(start[:3, :3] @ se3.so3_exp(x[..., 3:]), start[:3, 3] + x[..., :3])
 
     def away(self, start: Array, pose: Array) -> tuple[float, float]:
         """Distance and turn of a pose from the start, in radii."""
@@ -104,7 +104,7 @@ class Score:
             self._foreground = np.stack([small(view) for view in foreground])
         self._still = (self._foreground.max(0, initial=0.0) < _STILL).astype(np.float32)
         self._colour = _clustered([small(image) for image in canvas.images], self._valid, rng)
-        self._region = np.repeat(self._valid[None], len(canvas), 0)
+        self._limit_to(np.repeat(self._valid[None], len(canvas), 0))
         _, material = np.unique(mesh.colours.round(3), axis=0, return_inverse=True)
         self._materials = int(material.max()) + 1
         self._face_material = material.reshape(-1)[mesh.face_part].astype(np.int32)
@@ -118,13 +118,19 @@ class Score:
         """
         import cv2
 
+        region = self._region.copy()
         for view, links in enumerate(self._canvas.parent_T_link):
             seen = np.zeros(self._valid.shape, np.uint8)
             for pose in camera_T_parents:
                 self._renderers[0].rasterise(pose @ links)
                 seen |= self._renderers[0].face >= 0
             grown = cv2.dilate(seen, np.ones((_REGION_GROW_PX,) * 2, np.uint8))
-            self._region[view] = self._valid & (grown > 0)
+            region[view] = self._valid & (grown > 0)
+        self._limit_to(region)
+
+    def _limit_to(self, region: NDArray[np.bool_]) -> None:
+        self._region = region
+        self._colours_in_region = np.bincount(self._colour[region], minlength=_COLOURS).astype(float)
 
     def __call__(self, camera_T_parents: Array) -> Array:
         """Costs (n,) of poses (n, 4, 4)."""
@@ -134,32 +140,25 @@ class Score:
         return np.concatenate(threads.each(lambda pair: self._costs(*pair), pairs))
 
     def _costs(self, renderer: Renderer, poses: Array) -> Array:
-        views = len(self._canvas)
-        covered = np.zeros((views, *self._valid.shape), np.uint8)
-        counts = np.zeros((self._materials + 1, _COLOURS))
-        costs = np.zeros(len(poses))
-        for n, pose in enumerate(poses):
-            counts[:] = 0
-            covered[:] = 0
-            for view in range(views):
-                renderer.rasterise(pose @ self._canvas.parent_T_link[view])
-                kernels.mark_covered(renderer.face, renderer.box, covered[view])
-                kernels.count_materials(
-                    renderer.face, self._face_material, self._colour[view], self._region[view], counts
-                )
-            costs[n] = -mutual_information(counts) / views
-            if self.has_motion:
-                motion = kernels.motion_cost(covered, self._foreground, self._still, self._valid)
-                costs[n] += _MOTION_WEIGHT * motion
+        costs = np.empty(len(poses))
+        kernels.pose_costs(
+            renderer.scene,
+            renderer.sight,
+            poses,
+            self._canvas.parent_T_link,
+            self._face_material,
+            self._colour,
+            self._region,
+            self._colours_in_region,
+            self._foreground,
+            self._still,
+            self._valid,
+            _MOTION_WEIGHT,
+            np.zeros(self._colour.shape, np.uint8),
+            np.zeros((self._materials + 1, _COLOURS)),
+            costs,
+        )
         return costs
-
-
-def mutual_information(counts: Array) -> float:
-    """Of a table of counts (M, C), nats times count, less what independent draws would show on average."""
-    filled = counts + 1e-9
-    expected = filled.sum(1, keepdims=True) * filled.sum(0, keepdims=True) / filled.sum()
-    bias = 0.5 * (counts.shape[0] - 1) * (counts.shape[1] - 1)
-    return float((filled * np.log(filled / expected)).sum() - bias)
 
 
 def _clustered(
@@ -190,7 +189,7 @@ def search(
     coordinates = np.concatenate([np.zeros((1, 6)), ball.draw(rng, draws)])
 
     def poses(x: Array) -> Array:
-        return se3.inverse(np.stack([ball.pose(start, row) for row in x]))
+        return se3.inverse(ball.pose(start, x))
 
     def cost(x: Array) -> Array:
         off = np.linalg.norm((x / ball.scale).reshape(-1, 2, 3), axis=2)

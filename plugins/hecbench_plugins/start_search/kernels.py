@@ -6,7 +6,32 @@ from __future__ import annotations
 
 import numba
 
+from hecbench.rendering.kernels import see
+
 _jit = numba.njit(cache=True, nogil=True)
+
+
+@_jit
+def coverage(scene, sight, camera_T_parent, parent_T_link, covered):
+    """Fill `covered` (N, H, W) with 1 where the robot is drawn in a view, 0 elsewhere and where all views have it.
+
+    `scene` and `sight` are those of a `Renderer`, `parent_T_link` is (N, L, 4, 4).
+    """
+    face, box = sight[5], sight[6]
+    views = len(parent_T_link)
+    covered[:] = 0
+    for v in range(views):
+        see(scene, sight, camera_T_parent, parent_T_link[v])
+        for y in range(box[2], box[3] + 1):
+            for x in range(box[0], box[1] + 1):
+                covered[v, y, x] = face[y, x] >= 0
+    for y in range(box[2], box[3] + 1):
+        for x in range(box[0], box[1] + 1):
+            by = 0
+            for v in range(views):
+                by += covered[v, y, x] > 0
+            if by == views:
+                covered[:, y, x] = 0
 
 
 @_jit

@@ -41,7 +41,7 @@ class RaggedMasks(SolverFailure):
 @lru_cache(maxsize=4)
 def meshes_by_level(model: RobotModel) -> dict[int, RenderMesh]:
     """The model's meshes by level; merged cells move no contour by more than a tenth of a level's pixel."""
-    return {level: RenderMesh.of(model, cell_m=cell_m) for level, cell_m in _COARSE_CELL_M.items()}
+    return {level: RenderMesh.cached(model, cell_m=cell_m) for level, cell_m in _COARSE_CELL_M.items()}
 
 
 @dataclass(frozen=True, eq=False)

@@ -63,6 +63,7 @@ def test_cut_off_at_any_byte(tmp_path):
         contents = store.read(tmp_path)
         complete = sum(end - 1 <= length for end in ends)
         assert len(contents.estimates) == complete
+        assert store.keys(tmp_path) == {store.key(estimate) for estimate in contents.estimates}
         tail = length not in (0, *ends, *(end - 1 for end in ends))
         assert len(contents.damage) == tail
         if length:
@@ -79,6 +80,7 @@ def test_foreign_lines_are_named_and_skipped(tmp_path, junk):
     path.write_bytes(lines[0] + junk + lines[1])
     contents = store.read(tmp_path)
     assert len(contents.estimates) == 2
+    assert store.keys(tmp_path) == {store.key(estimate) for estimate in contents.estimates}
     assert ":2: damaged" in contents.damage[0]
 
 
