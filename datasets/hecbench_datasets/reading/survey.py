@@ -80,7 +80,12 @@ def _below(folder: Path) -> list[Path]:
     waiting = [(folder, 1)]
     while waiting and len(files) < _MOST_FILES:
         place, level = waiting.pop(0)
-        entries = sorted(place.iterdir(), key=natural)
+        try:
+            entries = sorted(place.iterdir(), key=natural)
+        except OSError as error:
+            raise InputError(
+                f"{place}: cannot be read ({error.strerror}); check the path and its permissions"
+            ) from error
         files += [entry for entry in entries if entry.is_file() and entry.name != HINTS_NAME]
         if level < _DEEPEST:
             waiting += [(e, level + 1) for e in entries if e.is_dir() and not e.name.startswith(".")]
