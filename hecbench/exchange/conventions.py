@@ -160,8 +160,13 @@ def prove(
         return _proof(
             fitting[0], f"{source}: {_margin(fitting[0], candidates, still, documented if settled else [])}"
         )
+    return _as_documented(source, candidates, documented if settled else [])
+
+
+def _as_documented(source: str, candidates: Sequence[_Candidate], documented: Sequence[_Candidate]) -> Proof:
+    """The documented reading, where none holds still; without one an error that names the cause."""
     ranked = sorted(candidates, key=lambda c: c.stillness.relative)
-    if settled:
+    if documented:
         note = f"{source}: read as documented, {documented[0]}; no reading holds the target still, "
         return _proof(documented[0], note + f"the best is {ranked[0]}: pairs mixed up, or too little motion?")
     raise InputError(
