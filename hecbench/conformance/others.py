@@ -92,6 +92,7 @@ def exports(spec: ExporterSpec) -> Iterator[str]:
             recording=recording.name,
             mounting=mounting,
             parent_link=recording.parent_link,
+            camera=recording.camera,
         )
         text = spec.write(answer, {"marker": "target", "other_link": "flange"})
         if not text.strip():
