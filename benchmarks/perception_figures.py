@@ -159,7 +159,7 @@ def main():
             float(np.median([one.get("seconds", np.nan) for one in each])), 3
         )
     else:
-        if o.solver == "keypoints":
+        if o.solver.startswith("keypoints"):
             o.segmenter = None
         given = f", masks {o.segmenter}, start {o.start[0]} m {o.start[1]} deg" if o.segmenter else ""
         name = f"cameras, {o.name}, {o.solver}, {o.views} views{given}"

@@ -87,12 +87,15 @@ def main():
         for column, numbers in zip(COLUMNS, values.T, strict=True):
             interval = bootstrap(numbers)
             figures[column] = [round(v, 4) for v in (interval.value, interval.low, interval.high)]
-        shown = name.partition("[")[0]
+        shown, _, model = name.rstrip("]").partition("[model=")
         figures |= {
             "command": f"python benchmarks/translation_figures.py {' '.join(sys.argv[1:])}",
             "commit": commit.strip(),
             "date": datetime.now(UTC).date().isoformat(),
         }
+        if model:
+            card = json.loads((Path(model) / "model.json").read_text())
+            figures["trained"] = f"{card.get('size', '')} px, {card.get('steps', '')} steps"
         known[f"{o.name}, {shown}"] = figures
         print(shown, {column: figures[column] for column in COLUMNS})
     o.out.parent.mkdir(parents=True, exist_ok=True)

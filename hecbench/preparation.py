@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from hecbench import registry
+from hecbench import registry, threads
 from hecbench.errors import InputError, Refusal
-from hecbench.recording import Recording
+from hecbench.recording import ImageSource, Recording
 from hecbench.robots.posed import PosedRobot
 from hecbench.specs import DatasetSpec, Kind, Need, ObserverSpec, SegmenterSpec
 
@@ -92,8 +95,40 @@ class Segmented:
     given_iou: float | None = None
 
 
+def readable(recording: Recording) -> Recording:
+    """Without the pictures that cannot be read: each costs its sample, and joins the notes, instead of its recording.
+
+    They are only decoded where a method may look at them: with joints and a robot model.
+    """
+    if not {Need.JOINTS, Need.ROBOT_MODEL} <= recording.offers():
+        return recording
+    changes: dict[str, Any] = {}
+    faults: list[str] = []
+    for name, decode in (("images", recording.image), ("masks", recording.mask)):
+        sources: tuple[ImageSource, ...] = getattr(recording, name) or ()
+        given = [i for i, source in enumerate(sources) if source is not None]
+        found = dict(zip(given, threads.each(partial(_fault, decode), given), strict=True))
+        if any(found.values()):
+            changes[name] = tuple(None if found.get(i) else source for i, source in enumerate(sources))
+            faults += [f"left out: {fault}" for fault in found.values() if fault]
+    return replace(recording, **changes, notes=(*recording.notes, *faults)) if faults else recording
+
+
+def _fault(decode: Callable[[int], object], index: int) -> str | None:
+    """Why a picture cannot be decoded, or None."""
+    try:
+        decode(index)
+    except InputError as error:
+        return str(error)
+    return None
+
+
 def segmented(recording: Recording, name: str | None) -> Segmented:
-    """Let a segmenter, which does not see the truth, make the masks; None leaves them as they are."""
+    """Let a segmenter, which does not see the truth, make the masks; None leaves them as they are.
+
+    Pictures that cannot be read are left out first.
+    """
+    recording = readable(recording)
     if name is None:
         return Segmented(recording)
     segmenter = registry.load().get(Kind.SEGMENTER, name, SegmenterSpec)

@@ -128,6 +128,20 @@ class AprilTagTarget(Target):
         return np.array([[-half, half, 0], [half, half, 0], [half, -half, 0], [-half, -half, 0]])
 
 
+def grid_shape(points_m: Array) -> tuple[int, int] | None:
+    """(columns, rows) of points (P, 3) m that form a grid row by row, x along the columns, z = 0."""
+    if len(points_m) < 4 or points_m[:, 2].any():
+        return None
+    columns = int((np.abs(points_m[:, 1] - points_m[0, 1]) < 1e-9).sum())
+    rows, rest = divmod(len(points_m), columns)
+    if rest or columns < 2 or rows < 2:
+        return None
+    spacing = points_m[1, 0] - points_m[0, 0]
+    y, x = np.mgrid[:rows, :columns]
+    expected = np.stack([x.ravel(), y.ravel()], 1) * spacing + points_m[0, :2]
+    return (columns, rows) if spacing > 0 and np.allclose(points_m[:, :2], expected, atol=1e-6) else None
+
+
 def _grid(columns: int, rows: int, spacing_m: float) -> Array:
     y, x = np.mgrid[:rows, :columns]
     return np.stack([x.ravel(), y.ravel(), np.zeros(rows * columns)], 1) * spacing_m

@@ -48,3 +48,9 @@ def hecbench_exporters() -> Iterable[ExporterSpec]:
         suffix=".launch.py",
         write=export.moveit_launch_ros2,
     )
+    yield ExporterSpec(
+        name="camera_info",
+        summary="the calibrated lens as ROS's camera_info file (YAML)",
+        suffix=".yaml",
+        write=export.camera_info,
+    )

@@ -22,6 +22,10 @@ from hecbench_hardware.kinematics import Arm
 _TURN_STEP_RAD = 0.2
 """Sum of the joint steps between the first samples of a joint motion; the check puts more where they are needed."""
 _LINE_STEP_M, _LINE_TURN_RAD = 0.01, 0.05
+_TURN_ARM_M = 0.2
+"""Metres of travel that a radian of turn counts for in the pace of a line: the simulated controller's rule. The maker
+does not publish his; a lower speed is slower there too."""
+_NO_LENGTH_M = 1e-6
 _JUMP_RAD = 0.5
 """A joint step between two samples of a straight line above which it is a singularity."""
 
@@ -182,14 +186,18 @@ class LineMotion:
         turns = steps * (np.abs(rates) + np.maximum(bends[:-1], bends[1:]))
         return steps * way_m, turns @ reaches_m(self.arm)
 
-    def speed_m_s(self, joint_speed_rad_s: float) -> float:
-        """The tool speed at which no joint is faster than allowed.
+    @property
+    def length_m(self) -> float:
+        """What the tool speed counts along: the shift, or the turn where that takes longer."""
+        turned_m = _TURN_ARM_M * float(np.linalg.norm(self.turn_rad))
+        return max(float(np.linalg.norm(self.shift_m)), turned_m)
 
-        Infinite for a turn on the spot, whose pace the controller chooses.
-        """
+    def speed_m_s(self, joint_speed_rad_s: float) -> float:
+        """The tool speed at which no joint is faster than allowed; infinite where nothing moves."""
+        if self.length_m < _NO_LENGTH_M:
+            return float("inf")
         step_rad = float(np.abs(np.diff(self.joints, axis=0)).max())
-        step_m = float(np.linalg.norm(self.shift_m)) / (len(self.joints) - 1)
-        return joint_speed_rad_s * step_m / step_rad if step_m > 1e-6 and step_rad > 0 else float("inf")
+        return joint_speed_rad_s * self.length_m / (len(self.joints) - 1) / step_rad
 
 
 def motion_time_s(length: float, speed: float, acceleration: float) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,9 @@ Array = NDArray[np.float64]
 _ITERATIONS = 30
 _CONVERGED = 1e-10
 """Relative fall of the cost."""
+_EXACT = 1e-16
+"""px^2."""
+_SHARED_CONVERGED = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +37,11 @@ class Normals:
     by_pose: Array
     by_shared: Array
     points_c: Array
+
+    def where(self, better: NDArray[np.bool_], there: Normals) -> Normals:
+        """These, with the pictures that are `better` (M,) from elsewhere."""
+        pairs = [(getattr(self, item.name), getattr(there, item.name)) for item in fields(self)]
+        return Normals(*(np.where(better.reshape(-1, *[1] * (a.ndim - 1)), b, a) for a, b in pairs))
 
 
 def linearised(
@@ -70,18 +78,94 @@ def refined(
     for _ in range(_ITERATIONS):
         transposed = np.swapaxes(at.by_pose, 1, 2)
         information = transposed @ at.by_pose
-        diagonal = np.maximum(np.diagonal(information, axis1=1, axis2=2), 1e-12)
         gradient = transposed @ at.residuals_px.reshape(len(poses), -1, 1)
-        damped = information + (damping[:, None] * diagonal)[:, None] * np.eye(6)
-        moved = se3.exp(-np.linalg.solve(damped, gradient)[..., 0]) @ poses
+        moved = se3.exp(-np.linalg.solve(_damped(information, damping[:, None]), gradient)[..., 0]) @ poses
         there = linearised(moved, points_m, corners_px, sensor, none)
         better = there.costs <= at.costs
-        gained = np.where(better & np.isfinite(at.costs), at.costs - there.costs, 0.0)
+        both = np.isfinite(at.costs) & np.isfinite(there.costs)
+        change = np.subtract(at.costs, there.costs, where=both, out=np.full(len(poses), np.inf))
         poses[better] = moved[better]
         damping = np.where(better, np.maximum(damping / 10, 1e-12), damping * 10)
-        settled = (gained <= _CONVERGED * there.costs + 1e-18) & (better | (damping > 1e6))
-        at = linearised(poses, points_m, corners_px, sensor, none)
-        if settled.all():
+        at = at.where(better, there)
+        if (np.abs(change) <= _CONVERGED * at.costs + _EXACT).all():
             break
     seen = np.isfinite(corners_px).all(-1).sum(1)
     return poses, np.sqrt(at.costs / np.maximum(seen, 1))
+
+
+@dataclass(frozen=True, eq=False)
+class SharedFit:
+    """Target poses (M, 4, 4) of all pictures with what they share: the camera's parameters and the board's pitch.
+
+    Attributes:
+        pitch: the distance of rows over that of columns, times the declared one.
+        squares_px2: of all residuals.
+        free: how many shared numbers were fitted.
+    """
+
+    camera_T_target: Array
+    parameters: Array
+    pitch: float
+    squares_px2: float
+    free: int
+
+
+def fit_shared(
+    camera_T_target: Array,
+    points_m: Array,
+    corners_px: Array,
+    sensor: Sensor,
+    parameters: Array,
+    basis: Array,
+) -> SharedFit:
+    """Poses and shared unknowns at the least reprojection error; poses are eliminated by the Schur complement.
+
+    Args:
+        camera_T_target: (M, 4, 4) m, the start.
+        points_m: (P, 3) in the target's frame.
+        corners_px: (M, P, 2), NaN where not seen.
+        sensor: with K parameters.
+        parameters: (K,), the start.
+        basis: (K + 1, F) directions in which parameters and the logarithm of the pitch may change.
+    """
+    poses, values, log_pitch, damping = camera_T_target, parameters, 0.0, 1e-4
+    at, shared = _with_pitch(poses, points_m, log_pitch, corners_px, sensor, values)
+    for _ in range(_ITERATIONS):
+        J, r = shared @ basis, at.residuals_px.reshape(len(poses), -1, 1)
+        own = np.swapaxes(at.by_pose, 1, 2)
+        information = _damped(own @ at.by_pose, damping)
+        eliminated = np.linalg.solve(information, np.concatenate([own @ J, own @ r], -1))
+        reduced = (np.swapaxes(J, 1, 2) @ np.concatenate([J, r], -1)).sum(0)
+        reduced -= (np.swapaxes(J, 1, 2) @ at.by_pose @ eliminated).sum(0)
+        step = -np.linalg.lstsq(_damped(reduced[:, :-1], damping), reduced[:, -1], rcond=1e-12)[0]
+        change = basis @ step
+        turned = se3.exp(-(eliminated[..., -1] + eliminated[..., :-1] @ step)) @ poses
+        moved = turned, values + change[:-1], log_pitch + float(change[-1])
+        there, shared_there = _with_pitch(moved[0], points_m, moved[2], corners_px, sensor, moved[1])
+        before, after = at.costs.sum(), there.costs.sum()
+        if not after <= before:
+            damping *= 10
+            if damping > 1e8:
+                break
+            continue
+        (poses, values, log_pitch), at, shared, damping = moved, there, shared_there, max(damping / 10, 1e-10)
+        if before - after <= _SHARED_CONVERGED * after:
+            break
+    return SharedFit(poses, values, float(np.exp(log_pitch)), float(at.costs.sum()), basis.shape[1])
+
+
+def _with_pitch(
+    poses: Array, points_m: Array, log_pitch: float, corners_px: Array, sensor: Sensor, parameters: Array
+) -> tuple[Normals, Array]:
+    """`linearised` for a board of this pitch, and the derivatives (M, 2 P, K + 1) by parameters and log pitch."""
+    points = points_m * [1.0, np.exp(log_pitch), 1.0]
+    at = linearised(poses, points, corners_px, sensor, parameters)
+    # A shift of a point along the board's y axis moves it in the camera as a translation of its own would.
+    by_point = at.by_pose[..., 3:].reshape(*at.residuals_px.shape, 3)
+    along = (by_point @ poses[:, None, :3, 1:2])[..., 0] * points[:, 1][:, None]
+    return at, np.concatenate([at.by_shared, along.reshape(len(poses), -1, 1)], -1)
+
+
+def _damped(information: Array, damping: Array | float) -> Array:
+    diagonal = np.maximum(np.diagonal(information, axis1=-2, axis2=-1), 1e-12)
+    return information + (damping * diagonal)[..., None] * np.eye(diagonal.shape[-1])

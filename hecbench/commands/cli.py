@@ -22,6 +22,7 @@ from hecbench.commands.calibrate import calibrate
 from hecbench.commands.robot import robot
 from hecbench.commands.run import demo, run
 from hecbench.commands.solve import solve
+from hecbench.commands.view import view
 from hecbench.errors import HecbenchError, InputError
 
 COMMAND_GROUP = "hecbench.commands"
@@ -83,7 +84,7 @@ def cli() -> None:
     """Calibrate hand-eye rigs with every method, measure all by the same rulers, and report."""
 
 
-for _verb in (calibrate, demo, robot, run, solve):
+for _verb in (calibrate, demo, robot, run, solve, view):
     cli.add_command(_verb)
 
 

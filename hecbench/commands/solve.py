@@ -75,6 +75,8 @@ def solve(
         critical = console.print_critical(examined.findings_json, loaded.name)
         estimates = best_first(calibrating.solved(examined, specs, options, progress.start, progress.done))
     verdict = calibrating.judged(examined, specs, estimates) if check else None
+    if verdict is not None and loaded.truth_parent_T_camera is None:
+        estimates = verdict.recommended_first(estimates)
     if out is not None:
         _save(estimates, examined, verdict, out)
     if as_json:

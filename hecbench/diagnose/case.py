@@ -21,6 +21,9 @@ Array = NDArray[np.float64]
 
 STANDS_OUT = 5.0
 """Variance ratio (6 and 6 N - 19 degrees of freedom) that a sample of ten exceeds once in 1500 times."""
+_BEFORE = 0.3
+"""Cosine of the widest angle off the axis at which a camera sees a target."""
+_MOSTLY = 0.9
 _REJECTED_AT_ONCE = 40
 """One sample in so many; the others are then judged without them."""
 _LEAST_SHARE = 0.5
@@ -37,6 +40,8 @@ class Examination:
         judged: False once the data cannot be fitted, with the reason in a finding.
         size_factor: by which the declared size of the target is multiplied.
         explained: ids of samples whose fault has been named.
+        pictures: samples before those of one robot pose were taken together.
+        noise_px: rms distance that a corner keeps from its own picture's target pose; None when unknown.
     """
 
     recording: Recording
@@ -44,6 +49,8 @@ class Examination:
     judged: bool = True
     size_factor: float = 1.0
     explained: frozenset[str] = frozenset()
+    noise_px: float | None = None
+    pictures: int = 0
 
     @staticmethod
     def of(recording: Recording, prepared: Recording | None = None) -> Examination:
@@ -57,7 +64,7 @@ class Examination:
         given = recording.camera is not None and recording.camera.K is not None
         fitted = not given and seen.camera is not None and seen.camera.K is not None
         known = replace(recording.without_truth(), corners_px=seen.corners_px, camera=seen.camera)
-        return Examination(known, fitted)
+        return Examination(known, fitted, pictures=len(known))
 
     @cached_property
     def observed(self) -> Recording:
@@ -81,12 +88,23 @@ class Examination:
 
     @property
     def camera_T_target(self) -> Array:
-        """(N, 4, 4) m of the usable samples, for a target of the true size."""
+        """(N, 4, 4) m of the usable samples, for a target of the true size, seen by an optical camera."""
         poses = self.observed.camera_T_target
         assert poses is not None
         poses = poses[self.usable]
         poses[:, :3, 3] *= self.size_factor
-        return poses
+        return np.asarray(self.optical_T_camera @ poses)
+
+    @cached_property
+    def optical_T_camera(self) -> Array:
+        """(4, 4) from the recording's camera frame to one that has all targets before it.
+
+        The identity for a camera with pixels; target poses alone may be given in any frame.
+        """
+        poses = self.observed.camera_T_target
+        if poses is None or self.recording.corners_px is not None:
+            return np.eye(4)
+        return looking_at(self.size_factor * poses[np.isfinite(poses).all((1, 2)), :3, 3])
 
     @property
     def focal_px(self) -> float | None:
@@ -180,6 +198,27 @@ class Examination:
     def with_robot_poses(self, base_T_flange: Array) -> Examination:
         """The case as it would be with other robot poses (samples, 4, 4)."""
         return replace(self, recording=replace(self.recording, base_T_flange=base_T_flange))
+
+
+def looking_at(positions: Array) -> Array:
+    """optical_T_camera (4, 4) of a camera that sees positions (N, 3) m; the identity where this one does.
+
+    A frame among the positions is left backwards, until they fill the usual angle of view.
+    """
+    distances = np.linalg.norm(positions, axis=1)
+    if not len(positions) or (positions[:, 2] > _BEFORE * distances).mean() > _MOSTLY:
+        return np.eye(4)
+    centre = positions.mean(0)
+    forward = centre / max(float(np.linalg.norm(centre)), 1e-12)
+    sideways = np.eye(3)[int(np.abs(forward).argmin())]
+    across = np.cross(sideways, forward)
+    across /= np.linalg.norm(across)
+    rotation = np.stack([across, np.cross(forward, across), forward])
+    ahead = positions @ forward
+    back = 0.0
+    if (ahead < _BEFORE * distances).mean() > 1 - _MOSTLY:
+        back = 2 * float(np.linalg.norm(positions - centre, axis=1).max())
+    return se3.make(rotation, [0.0, 0.0, back])
 
 
 def inverted(base_T_flange: Array) -> Array:

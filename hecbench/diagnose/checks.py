@@ -9,6 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from hecbench.diagnose import (
+    camera_frame,
+    clock_lag,
     conditioning,
     consistency,
     coverage,
@@ -19,28 +21,36 @@ from hecbench.diagnose import (
     next_pose,
     outlier_sample,
     pairing,
+    picture_residual,
     planar_ambiguity,
     pose_direction_or_mounting,
+    repeats,
     robot_model,
     rotation_diversity,
+    rotation_reading,
     sample_moving,
     target_scale,
     units,
 )
 from hecbench.diagnose.case import Examination
-from hecbench.diagnose.finding import Finding
+from hecbench.diagnose.finding import Finding, Severity
 from hecbench.recording import Recording
 
 _STEPS: tuple[Callable[[Examination], tuple[Finding | None, Examination]], ...] = (
     image_quality.examine,
+    repeats.examine,
+    camera_frame.examine,
+    picture_residual.examine,
     robot_model.examine,
     joints_vs_pose.examine,
     sample_moving.examine,
     rotation_diversity.examine,
     pose_direction_or_mounting.examine,
     units.examine,
+    clock_lag.examine,
     pairing.examine,
     intrinsics.examine,
+    rotation_reading.examine,
     consistency.examine,
     target_scale.examine,
     outlier_sample.examine,
@@ -64,4 +74,7 @@ def check(recording: Recording, prepared: Recording | None = None) -> list[Findi
         finding, case = examine(case)
         if finding is not None:
             findings.append(finding)
-    return findings
+    faulty = {finding.id for finding in findings if finding.severity is not Severity.OK}
+    return [
+        finding for finding in findings if finding.severity is not Severity.OK or finding.id not in faulty
+    ]

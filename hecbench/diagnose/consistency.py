@@ -6,12 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from hecbench.agreement import LARGEST_SHARE, percent
 from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity
 
 ID = "consistency"
-LIMIT = 0.25
-"""Of the target's own motion in the image; data without a common calibration leave as much as it moves."""
 
 
 def examine(case: Examination) -> tuple[Finding | None, Examination]:
@@ -20,17 +19,19 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
         return None, case
     fit = case.fit
     left = np.inf if fit is None else fit.relative
-    if fit is None or left > LIMIT:
+    if fit is None or left > LARGEST_SHARE:
         summary = "no calibration explains the poses"
         if fit is not None:
-            summary += f": the typical sample is left with {100 * left:.0f} % of the target's motion"
+            summary += f": the typical sample is left with {percent(left)} of the target's motion"
         action = (
             "check how rotations are written (quaternion order, Euler order, degrees), that poses and images are "
             "of the same moment, and that base_T_flange ends at one frame"
         )
-        return Finding(ID, Severity.CRITICAL, summary, action, left, LIMIT), replace(case, judged=False)
+        return Finding(ID, Severity.CRITICAL, summary, action, left, LARGEST_SHARE), replace(
+            case, judged=False
+        )
     summary = (
         f"the typical sample agrees with one calibration to {fit.in_mm(fit.typical_px):.2g} mm "
         f"({fit.typical_px:.2g} px) across the view"
     )
-    return Finding(ID, Severity.OK, summary, value=left, limit=LIMIT), case
+    return Finding(ID, Severity.OK, summary, value=left, limit=LARGEST_SHARE), case

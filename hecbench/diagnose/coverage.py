@@ -22,6 +22,9 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
             return None, case
         summary = f"{len(case.usable)} samples have a robot pose and a target pose"
         severity = Severity.INFO if len(case.usable) >= FEW_SAMPLES else Severity.WARNING
+        if not len(case.usable):
+            summary = "no sample has a robot pose and a target pose: there is nothing to examine"
+            severity = Severity.CRITICAL
         action = "" if severity is Severity.INFO else "record 10 or more samples that show the target"
         return Finding(ID, severity, summary, action, float(len(case.usable)), float(FEW_SAMPLES)), case
     positions = case.agreed[0].camera_T_target[:, :3, 3]
@@ -29,9 +32,12 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
     flatness = float(extents_m[2] / extents_m[0])
     distance_m = float(np.median(positions[:, 2]))
     size = " x ".join(f"{1e3 * extent:.0f}" for extent in extents_m)
-    summary = f"{len(positions)} samples, target positions spread by {size} mm rms at {distance_m:.2g} m"
+    samples = f"{len(positions)} samples"
+    if case.pictures > len(case.recording):
+        samples = f"{case.pictures} samples at {len(positions)} robot poses, which count once each"
+    summary = f"{samples}, target positions spread by {size} mm rms at {distance_m:.2g} m"
     if len(positions) < FEW_SAMPLES:
-        action = "record 10 or more samples"
+        action = "record samples at 10 or more robot poses"
         return Finding(ID, Severity.WARNING, summary, action, float(len(positions)), float(FEW_SAMPLES)), case
     if flatness < FLAT:
         summary += ": they lie in a plane"

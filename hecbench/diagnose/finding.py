@@ -57,6 +57,10 @@ class Finding:
 
 
 def names(samples: tuple[str, ...], most: int = 8) -> str:
-    """Sample ids for a sentence."""
+    """Sample ids for a sentence; a run of numbers only by its ends."""
+    if len(samples) > 3 and all(sample.isdigit() for sample in samples):
+        numbers = [int(sample) for sample in samples]
+        if numbers == list(range(numbers[0], numbers[0] + len(numbers))):
+            return f"{samples[0]} to {samples[-1]}"
     shown = ", ".join(samples[:most])
     return shown if len(samples) <= most else f"{shown} and {len(samples) - most} more"

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
+from hecbench.agreement import share_left
 from hecbench.bundle.adjustment import Solution, adjust
 from hecbench.bundle.model import Noise, Problem, State, predict
 from hecbench.recording import Mounting
@@ -67,8 +68,7 @@ class Fit:
     def relative(self) -> float:
         """The typical residual over the target's own motion in the image."""
         centres = self.problem.observed.mean(1)
-        moved = float(np.median(np.linalg.norm(centres - np.median(centres, axis=0), axis=1)))
-        return self.typical_px / max(moved, 1e-9)
+        return share_left(self.residuals_px, np.linalg.norm(centres - np.median(centres, axis=0), axis=1))
 
     def cures(self, given: Fit | None) -> bool:
         """Whether this reading of the data explains them, and the given one does much worse."""

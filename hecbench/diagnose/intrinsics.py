@@ -12,13 +12,11 @@ from hecbench import pictures
 from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity
 from hecbench.diagnose.fit import EXPLAINS, Fit
+from hecbench.diagnose.resolution import BY_SIZE, OFF_CENTRE, off_centre, rescaled, scaled
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel, Recording
 
 ID = "intrinsics"
-OFF_CENTRE = 0.15
-"""Of the image's size; lenses are centred to a few per cent."""
-_RATIOS = (0.25, 1 / 3, 0.5, 2 / 3, 0.75, 0.8, 1.25, 4 / 3, 1.5, 2.0, 3.0, 4.0)
 _HALF = 0.5
 _SAME_RATIO = 0.05
 """Of the relative position of the principal point across and down; a crop seldom keeps both."""
@@ -26,7 +24,6 @@ _SUSPICIOUS_PX = 4.0
 _SUSPICIOUS_SCALE = 0.02
 _SAME_SIZE = 0.1
 """Deviation of the target's apparent size that the right intrinsics may leave."""
-_BY_SIZE = "use the intrinsics of the resolution the images were taken at, or scale fx, fy, cx, cy"
 
 
 def examine(case: Examination) -> tuple[Finding | None, Examination]:
@@ -37,10 +34,10 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
     if (size := _image_size(case.recording)) and size != (camera.width, camera.height):
         summary = f"the images are {size[0]}x{size[1]} px, the camera {camera.width}x{camera.height}"
         ratio = size[0] / camera.width
-        return Finding(ID, Severity.CRITICAL, summary, _BY_SIZE, ratio, 1.0), _cured(case, camera, ratio)
+        return Finding(ID, Severity.CRITICAL, summary, BY_SIZE, ratio, 1.0), case
     if camera.K is None or case.fitted_intrinsics:
         return Finding(ID, Severity.INFO, "no intrinsics are given", "calibrate them from the images"), case
-    offset = float(np.abs(camera.K[:2, 2] / [camera.width, camera.height] - 0.5).max())
+    offset = off_centre(camera)
     outside = _outside(case.recording)
     fit = case.fit
     suspicious = (
@@ -60,10 +57,10 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
                 f"the intrinsics are of another resolution: times {ratio:.3g} the typical sample fits to "
                 f"{better.typical_px:.2g} px, as given to {fit.typical_px if fit else np.inf:.3g} px"
             )
-            return Finding(ID, Severity.CRITICAL, summary, _BY_SIZE, ratio, 1.0), _cured(case, camera, ratio)
+            return Finding(ID, Severity.CRITICAL, summary, BY_SIZE, ratio, 1.0), _cured(case, camera, ratio)
     if outside:
         summary = f"{outside} corners lie outside the {camera.width}x{camera.height} image"
-        return Finding(ID, Severity.CRITICAL, summary, _BY_SIZE, float(outside), 0.0), case
+        return Finding(ID, Severity.CRITICAL, summary, BY_SIZE, float(outside), 0.0), case
     summary = f"the principal point is {100 * offset:.0f} % of the image's size from its centre"
     if offset <= OFF_CENTRE:
         return Finding(ID, Severity.OK, summary, value=offset, limit=OFF_CENTRE), case
@@ -71,10 +68,10 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
     if abs(across - down) < _SAME_RATIO:
         ratio = 1 / (across + down)
         summary += f", as for images of {1 / ratio:.3g} times this size"
-        return Finding(ID, Severity.CRITICAL, summary, _BY_SIZE, offset, OFF_CENTRE), _cured(
+        return Finding(ID, Severity.CRITICAL, summary, BY_SIZE, offset, OFF_CENTRE), _cured(
             case, camera, ratio
         )
-    action = f"{_BY_SIZE}; for a cropped image this may be right"
+    action = f"{BY_SIZE}; for a cropped image this may be right"
     return Finding(ID, Severity.WARNING, summary, action, offset, OFF_CENTRE), case
 
 
@@ -97,27 +94,19 @@ def _outside(recording: Recording) -> int:
     return int(beyond.any(-1).sum())
 
 
-def _scaled(camera: CameraModel, ratio: float) -> CameraModel:
-    assert camera.K is not None
-    K = camera.K.copy()
-    K[:2] *= ratio
-    return replace(camera, K=K)
-
-
 def _cured(case: Examination, camera: CameraModel, ratio: float) -> Examination:
     if camera.K is None:
         return case
-    return replace(case, recording=replace(case.recording, camera=_scaled(camera, ratio)))
+    return replace(case, recording=replace(case.recording, camera=scaled(camera, ratio)))
 
 
 def _rescaled_fits(case: Examination, camera: CameraModel) -> Iterator[tuple[float, float, Fit]]:
     """Typical residual (rad) and the fit for every ratio that can be fitted."""
-    for ratio in _RATIOS:
-        scaled = _scaled(camera, ratio)
-        other = replace(case, recording=replace(case.recording, camera=scaled))
+    for ratio, rescaled_camera in rescaled(camera):
+        other = replace(case, recording=replace(case.recording, camera=rescaled_camera))
         if other.fit is not None:
-            assert scaled.K is not None
-            yield _angle(other.fit, scaled.K[0, 0]), ratio, other.fit
+            assert rescaled_camera.K is not None
+            yield _angle(other.fit, rescaled_camera.K[0, 0]), ratio, other.fit
 
 
 def _angle(fit: Fit | None, focal_px: float) -> float:

@@ -1,4 +1,4 @@
-"""Images paired with the wrong robot poses: all shifted by one, or some exchanged."""
+"""Images paired with the wrong robot poses: shifted, sorted otherwise, or some exchanged."""
 
 from __future__ import annotations
 
@@ -10,18 +10,29 @@ from numpy.typing import NDArray
 from hecbench.diagnose.case import STANDS_OUT, Examination
 from hecbench.diagnose.finding import Finding, Severity, names
 from hecbench.diagnose.fit import LEAST_SAMPLES, MUCH_BETTER
+from hecbench.diagnose.sequences import shifts, text_orders
 
 ID = "pairing"
 _SHIFTS = (1, -1)
+_LEAST_RUN = 2
+"""Samples that disagree before runs of them are looked for."""
 _FITS = 2 * STANDS_OUT
 _FAR_BETTER = 0.02
 """With the wrong robot pose a planar target may have got its mirrored pose, which then still fits badly."""
 
 
 def examine(case: Examination) -> tuple[Finding | None, Examination]:
-    """Residuals with the robot poses shifted by one sample; then exchanges among the samples that disagree."""
+    """Residuals with the robot poses shifted or in another order; then exchanges among the samples that disagree."""
     if not case.can_be_fitted or len(case.usable) <= LEAST_SAMPLES:
         return None, case
+    for attempt in (_all_shifted, _in_text_order, _partly_shifted, _swapped):
+        if (found := attempt(case)) is not None:
+            return found
+    as_given = np.inf if case.fit is None else case.fit.typical_px
+    return Finding(ID, Severity.OK, "no shift or exchange of robot poses fits better", value=as_given), case
+
+
+def _all_shifted(case: Examination) -> tuple[Finding, Examination] | None:
     as_given = np.inf if case.fit is None else case.fit.typical_px
     for shift in _SHIFTS:
         target, robot = _shifted(len(case.usable), shift)
@@ -34,20 +45,58 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
             )
             action = f"shift the robot poses by one against the images; drop the {'last' if shift > 0 else 'first'}"
             value, limit = moved.typical_px, MUCH_BETTER * as_given
-            return Finding(ID, Severity.CRITICAL, summary, action, value, limit), _repaired(
-                case, target, robot
-            )
-    if swaps := _exchanged(case):
-        order = np.arange(len(case.usable))
-        for a, b in swaps:
-            order[[a, b]] = b, a
-        concerned = case.ids(np.array(swaps).ravel())
-        pairs = "; ".join(f"{' and '.join(case.ids(np.array(pair)))}" for pair in swaps)
-        summary = f"the robot poses of samples {pairs} are exchanged: each fits the image of the other"
-        action = f"exchange the robot poses of {names(concerned)}"
-        finding = Finding(ID, Severity.CRITICAL, summary, action, float(len(swaps)), 0.0, concerned)
-        return finding, _repaired(case, np.arange(len(order)), order)
-    return Finding(ID, Severity.OK, "no shift or exchange of robot poses fits better", value=as_given), case
+            finding = Finding(ID, Severity.CRITICAL, summary, action, value, limit)
+            return finding, _repaired(case, target, robot)
+    return None
+
+
+def _in_text_order(case: Examination) -> tuple[Finding, Examination] | None:
+    for says, order in text_orders(len(case.usable)):
+        sorted_otherwise = case.fit_of(case.base_T_flange[order], case.camera_T_target)
+        if sorted_otherwise is not None and sorted_otherwise.cures(case.fit):
+            summary = f"{says}: sorted alike the typical sample fits to {sorted_otherwise.typical_px:.2g} px"
+            action = "number the files with leading zeros, or sort both by number"
+            finding = Finding(ID, Severity.CRITICAL, summary, action, sorted_otherwise.typical_px)
+            return finding, _repaired(case, np.arange(len(order)), order)
+    return None
+
+
+def _partly_shifted(case: Examination) -> tuple[Finding, Examination] | None:
+    """Images of which some belong to robot poses a few rows off: a row was missed in one stream."""
+    if case.agreed is not None and (~case.agreed[1]).sum() < _LEAST_RUN:
+        return None
+    moves = shifts(case)
+    if moves is None:
+        return None
+    runs = np.split(np.arange(len(moves)), np.flatnonzero(np.diff(moves)) + 1)
+    described = [
+        f"by {abs(moves[run[0]])} from sample {case.ids(run[:1])[0]} on (the pose of each image stands "
+        f"{abs(moves[run[0]])} rows {'below' if moves[run[0]] > 0 else 'above'} it)"
+        for run in runs
+        if moves[run[0]]
+    ]
+    concerned = case.ids(np.flatnonzero(moves))
+    summary = f"the robot poses are shifted against the images {'; '.join(described)}"
+    action = "pair images and robot poses anew: one stream has rows that the other lacks"
+    finding = Finding(ID, Severity.CRITICAL, summary, action, float(len(concerned)), 0.0, concerned)
+    robot = np.arange(len(moves)) + moves
+    paired = np.flatnonzero((robot >= 0) & (robot < len(moves)))
+    return finding, _repaired(case, paired, robot[paired])
+
+
+def _swapped(case: Examination) -> tuple[Finding, Examination] | None:
+    swaps = _exchanged(case)
+    if not swaps:
+        return None
+    order = np.arange(len(case.usable))
+    for a, b in swaps:
+        order[[a, b]] = b, a
+    concerned = case.ids(np.array(swaps).ravel())
+    pairs = "; ".join(f"{' and '.join(case.ids(np.array(pair)))}" for pair in swaps)
+    summary = f"the robot poses of samples {pairs} are exchanged: each fits the image of the other"
+    action = f"exchange the robot poses of {names(concerned)}"
+    finding = Finding(ID, Severity.CRITICAL, summary, action, float(len(swaps)), 0.0, concerned)
+    return finding, _repaired(case, np.arange(len(order)), order)
 
 
 def _shifted(count: int, shift: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

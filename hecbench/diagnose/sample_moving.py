@@ -62,6 +62,10 @@ def _by_stamps(case: Examination) -> Finding | None:
     if len(known) < 3:
         return None
     lags = camera[known] - robot[known]
+    if (lags == lags[0]).all():
+        summary = "images and robot poses carry stamps that never differ: whether one is late cannot be seen from them"
+        action = "stop the arm for every sample, or stamp images and robot poses where they are read"
+        return Finding(ID, Severity.INFO, summary, action)
     lags = np.abs(lags - np.median(lags))
     speed_m, speed_rad = _speeds(poses[known], robot[known])
     moved_mm, moved_deg = 1e3 * speed_m * lags, np.rad2deg(speed_rad * lags)

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.estimate import Estimate, Status, plain
-from hecbench.recording import Mounting
+from hecbench.recording import EQUIDISTANT, CameraModel, Mounting
 
 Array = NDArray[np.float64]
 
@@ -219,6 +219,61 @@ def moveit_launch_ros2(estimate: Estimate, options: Mapping[str, str]) -> str:
         f"    arguments = {arguments!r}\n"
         '    node = Node(package="tf2_ros", executable="static_transform_publisher", arguments=arguments)\n'
         "    return LaunchDescription([node])\n"
+    )
+
+
+def camera_info(estimate: Estimate, options: Mapping[str, str]) -> str:
+    """The calibrated camera as camera_calibration_parsers and camera_info_manager read it (YAML).
+
+    Five coefficients are plumb_bob, eight are rational_polynomial, four of a fisheye lens are equidistant; the other
+    lengths of OpenCV have no name in ROS. The projection is that of the undistorted picture with the same K.
+
+    Raises:
+        InputError: the estimate knows no intrinsics, or its distortion has no name in ROS.
+    """
+    import yaml
+
+    camera = estimate.camera
+    if camera is None or camera.K is None:
+        raise InputError(
+            f"estimate of '{estimate.solver}': holds no camera with K; give the recording's camera"
+        )
+    unknown = sorted(set(options) - set(OPTIONS))
+    if unknown:
+        raise InputError(f"option '{unknown[0]}': choose among {', '.join(OPTIONS)}")
+    name, length = _ros_lens(camera)
+    coefficients = np.zeros(length)
+    coefficients[: len(camera.distortion)] = camera.distortion
+    projection = np.hstack([camera.K, np.zeros((3, 1))])
+
+    def matrix(values: Array) -> dict[str, object]:
+        rows, columns = values.shape
+        return {"rows": rows, "cols": columns, "data": [float(value) for value in values.ravel()]}
+
+    content = {
+        "image_width": camera.width,
+        "image_height": camera.height,
+        "camera_name": options.get("optical", _OPTICAL).removesuffix("_optical_frame"),
+        "camera_matrix": matrix(camera.K),
+        "distortion_model": name,
+        "distortion_coefficients": matrix(coefficients[None]),
+        "rectification_matrix": matrix(np.eye(3)),
+        "projection_matrix": matrix(projection),
+    }
+    return str(yaml.safe_dump(content, sort_keys=False))
+
+
+def _ros_lens(camera: CameraModel) -> tuple[str, int]:
+    """The name of the lens model in ROS, and how many coefficients it takes."""
+    count = len(camera.distortion)
+    if camera.distortion_model == EQUIDISTANT:
+        return "equidistant", 4
+    if count <= 5:
+        return "plumb_bob", 5
+    if count == 8:
+        return "rational_polynomial", 8
+    raise InputError(
+        f"camera.distortion: {count} coefficients have no name in ROS; calibrate the lens with 5 or 8 of them"
     )
 
 

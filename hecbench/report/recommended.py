@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from hecbench import estimate, verdict
 from hecbench.errors import InputError
 from hecbench.estimate import Estimate, Status, best_first
+from hecbench.recording import Recording
 from hecbench.storage import results
 
 
@@ -34,3 +36,24 @@ def of(path: Path) -> Estimate:
     if best.status is not Status.OK:
         raise InputError(f"{path}: no method has an answer")
     return best
+
+
+def all_of(paths: Sequence[Path], recording: Recording) -> list[Estimate]:
+    """Every answer on a recording in files and folders, without doubles; the recommended one of a folder first.
+
+    Raises:
+        InputError: one is for another mounting or parent, or none has an answer.
+    """
+    found: dict[str, Estimate] = {}
+    for path in paths:
+        more = [of(path), *(results.read(path).estimates if path.is_dir() else ())]
+        for each in more:
+            if (each.mounting, each.parent_link) != (recording.mounting, recording.parent_link):
+                raise InputError(
+                    f"{path}: is {each.mounting} from {each.parent_link}, not of {recording.name}"
+                )
+            if each.status is Status.OK:
+                found.setdefault(each.solver, each)
+    if not found:
+        raise InputError(f"{paths[0]}: has no answer to show")
+    return list(found.values())

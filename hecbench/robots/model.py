@@ -6,6 +6,7 @@ about, or slides along, an axis of the joint frame.
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from fnmatch import fnmatchcase
@@ -196,7 +197,7 @@ def load_robot(name: str | Path, *, exclude: Iterable[str] = (), meshes: bool = 
     """
     arm, _, tool = str(name).partition("+")
     if arm not in KNOWN_ARMS:
-        path = Path(name) if Path(name).is_file() else packages.find(str(name)) or Path(name)
+        path = Path(name) if os.path.isfile(name) else packages.find(str(name)) or Path(name)
         model = _from_urdf(path, path.stem, meshes)
     elif tool not in ("", GRIPPER):
         raise InputError(f"robot '{name}': the known tool is {GRIPPER}")
@@ -217,7 +218,7 @@ def _airo_models() -> Path:
 
 
 def _from_urdf(path: Path, name: str, meshes: bool) -> RobotModel:
-    if not path.is_file():
+    if not os.path.isfile(path):
         raise InputError(
             f"{path}: no such URDF file; known robots: {', '.join(KNOWN_ARMS)}, and those that"
             " hecbench plugins --kind robot lists"

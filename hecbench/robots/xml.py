@@ -74,8 +74,14 @@ def local_name(element: Any) -> str:
 
 
 def drop_prefixed(root: Any) -> None:
-    """Remove the elements and attributes whose names have a prefix or namespace: other programs' extensions."""
+    """Remove the elements and attributes whose names have a prefix or namespace: other programs' extensions.
+
+    The namespace of the root itself, as a default for the whole document, is taken off the names.
+    """
+    space = root.tag.rpartition("}")[0] + "}" if "}" in root.tag else None
     for element in list(root.iter()):
+        if space is not None and isinstance(element.tag, str) and element.tag.startswith(space):
+            element.tag = local_name(element)
         if element is not root and (
             not isinstance(element.tag, str) or ":" in element.tag or "}" in element.tag
         ):

@@ -52,6 +52,7 @@ def judge(
         tolerance_mm: the error in the workspace that the user can live with.
         at_m: (3,) a place in the parent where the error is wanted too.
     """
+    given = {estimate.solver: estimate for estimate in estimates}
     ordered = best_first([replace(estimate, errors=None) for estimate in estimates])
     if recording.base_T_flange is None:
         return _without_answer(recording, ordered, findings, tolerance_mm)
@@ -61,12 +62,7 @@ def judge(
     best = _recommended(answers, scales, recording.camera)
     if best is None:
         return _without_answer(recording, ordered, findings, tolerance_mm)
-    others = sorted(
-        (answer for answer in answers if answer is not best),
-        key=lambda answer: distance_m(best, answer, scales.points_m),
-    )
-    near = [answer for answer in others if agree(best, answer, scales.points_m, scales.tolerance_m)]
-    far = [answer for answer in others if answer not in near]
+    near, far = _divided(best, answers, scales)
     expected, at = _expected(best, near, scales, at_m)
     suspicion = cameras.suspicion(answers, best, recording.camera)
     doubts = _doubts(best, near, far) + ([suspicion] if suspicion else [])
@@ -83,7 +79,7 @@ def judge(
         recording=recording.name,
         grade=grade,
         rule=rule,
-        recommended=best.estimate,
+        recommended=given[best.solver],
         expected=expected,
         at=at,
         tolerance_mm=tolerance_mm,
@@ -95,8 +91,18 @@ def judge(
         reasons=words.reasons(best, near, confirmed, doubts, recording, apart_mm),
         findings=findings,
         next=words.what_next(findings, expected, tolerance_mm, suspicion, len(recording)),
-        estimates=ordered,
+        estimates=[given[estimate.solver] for estimate in ordered],
     )
+
+
+def _divided(best: Answer, answers: Sequence[Answer], scales: Scales) -> tuple[list[Answer], list[Answer]]:
+    """The other answers, nearest first: those that agree with the best, and those that do not."""
+    others = sorted(
+        (answer for answer in answers if answer is not best),
+        key=lambda answer: distance_m(best, answer, scales.points_m),
+    )
+    near = [answer for answer in others if _agree(best, answer, scales)]
+    return near, [answer for answer in others if answer not in near]
 
 
 def _recommended(answers: Sequence[Answer], scales: Scales, given: CameraModel | None) -> Answer | None:

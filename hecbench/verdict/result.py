@@ -123,6 +123,11 @@ class Verdict:
         }
         return {key: plain(value) for key, value in content.items()}
 
+    def recommended_first(self, estimates: Sequence[Estimate]) -> list[Estimate]:
+        """The estimates with the recommended one moved to the front."""
+        name = self.recommended.solver if self.recommended else None
+        return sorted(estimates, key=lambda estimate: estimate.solver != name)
+
     def save(self, path: Path) -> None:
         """Write the JSON file, whole or not at all."""
         files.write_bytes(path, msgspec.json.format(msgspec.json.encode(self.to_json()), indent=1) + b"\n")

@@ -5,12 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hecbench.errors import Refusal, SolverFailure
 from hecbench.estimate import Estimate
 from hecbench.recording import Recording
 from hecbench.specs import Need, Solver
-from hecbench_plugins.views.pyramid import NoMask
+from hecbench_plugins.views.pyramid import NoMask, RaggedMasks
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -30,19 +33,29 @@ class MasksElsePhotographs:
     def __call__(self, recording: Recording, *, rng: np.random.Generator) -> Estimate:
         """Calibrate by masks if possible."""
         try:
-            return self._sharpened(self.by_masks(recording, rng=rng), recording, rng)
+            found = self.by_masks(recording, rng=rng)
         except NoMask:
             return self.by_photographs(recording, rng=rng)
+        except RaggedMasks as failure:
+            seen = self._from(failure.parent_T_camera, recording, rng)
+            if seen is None:
+                raise
+            return seen
         except SolverFailure:
             if Need.MASKS in recording.offers():
                 raise
             return self.by_photographs(recording, rng=rng)
+        if found.diagnostics.get("stage") != "coverage":
+            return found
+        return self._from(found.parent_T_camera, recording, rng) or found
 
-    def _sharpened(self, found: Estimate, recording: Recording, rng: np.random.Generator) -> Estimate:
-        """The end by masks, or by the photographs from there where the masks are not ones of sampled pixels."""
-        if found.diagnostics.get("stage") != "coverage" or Need.IMAGES not in recording.offers():
-            return found
+    def _from(
+        self, parent_T_camera: Array | None, recording: Recording, rng: np.random.Generator
+    ) -> Estimate | None:
+        """The end by photographs from where ragged masks led, or None where they confirm nothing there."""
+        if Need.IMAGES not in recording.offers():
+            return None
         try:
-            return self.from_start(replace(recording, initial_parent_T_camera=found.parent_T_camera), rng=rng)
+            return self.from_start(replace(recording, initial_parent_T_camera=parent_T_camera), rng=rng)
         except (Refusal, SolverFailure):
-            return found
+            return None

@@ -1,6 +1,7 @@
 """`calibrate`: one command, one answer, and folders that the other verbs accept."""
 
 import json
+import shutil
 from dataclasses import replace
 
 import numpy as np
@@ -84,3 +85,21 @@ def test_wrong_data_are_not_to_be_used(hecbench, tmp_path):
 def test_bad_usage(hecbench, refused, tmp_path):
     refused(hecbench("calibrate", tmp_path / "nowhere"), "nowhere", "does not exist")
     refused(hecbench("calibrate", tmp_path, "--at", "1,2"), "--at 1,2")
+
+
+def test_an_unreadable_image_costs_its_sample_only(hecbench, tmp_path):
+    from hecbench_datasets import photographs
+
+    shutil.copytree(photographs.FOLDER, tmp_path / "cell")
+    damaged, missing = (tmp_path / "cell" / "images" / name for name in ("img05.jpg", "img12.jpg"))
+    damaged.write_bytes(damaged.read_bytes()[:20_000])
+    missing.unlink()
+    done = hecbench(
+        "solve", tmp_path / "cell", "--solver", "render_gn_free", "--json", "--no-check", "--no-held-out"
+    )
+    assert done.returncode == 0, done.stderr
+    (estimate,) = json.loads(done.stdout)
+    assert len(estimate["diagnostics"]["confirmed_by_sample"]) == 10
+    assert "left out" in done.stderr
+    assert "img05.jpg" in done.stderr
+    assert "img12.jpg" in done.stderr

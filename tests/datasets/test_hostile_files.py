@@ -4,6 +4,7 @@ import os
 import pickle
 import subprocess
 import sys
+import zipfile
 
 import numpy as np
 import pytest
@@ -12,6 +13,7 @@ from hecbench_datasets.reading.sources import yaml_value
 
 from hecbench import files, registry
 from hecbench.errors import InputError
+from hecbench.preparation import load_recording
 from hecbench.recording import Mounting, Recording
 from hecbench.robots import urdf_files
 from hecbench.specs import DatasetSpec, Kind
@@ -204,3 +206,20 @@ def test_recognising_a_set_parses_no_pickle(tmp_path, sniffers, monkeypatch):
         assert sniffers(tmp_path) == ["baxter"]
     with pytest.raises(InputError, match="structures"):
         registry.load().get(Kind.DATASET, "baxter", DatasetSpec).load(tmp_path)
+
+
+@pytest.mark.parametrize("suffix", [".npz", ".xlsx"])
+def test_an_archive_that_unpacks_without_end_is_refused(tmp_path, suffix):
+    with zipfile.ZipFile(tmp_path / f"robot{suffix}", "w", zipfile.ZIP_DEFLATED) as archive:
+        for i in range(3):
+            archive.writestr(f"{i}.npy", bytes(50 << 20))
+    with pytest.raises(InputError, match="unpacks to 150 MB"):
+        load_recording(tmp_path)
+
+
+def test_a_hundred_thousand_links_within_links(tmp_path):
+    depth = 100_000
+    (tmp_path / "r.urdf").write_text("<robot>" + "<link>" * depth + "</link>" * depth + "</robot>")
+    with pytest.raises(InputError) as caught:
+        urdf_files.copy(tmp_path / "r.urdf", tmp_path / "copy")
+    assert "\n" not in str(caught.value)

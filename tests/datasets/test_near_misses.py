@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+from hecbench_datasets.reading.streams import clock_units
 from scipy.spatial.transform import Rotation
 
 from hecbench import se3
@@ -213,3 +214,13 @@ def test_what_is_missing_is_named(tmp_path, files, message):
         load_recording(tmp_path)
     assert "\n" not in str(caught.value)
     assert len(str(caught.value)) < 600
+
+
+@pytest.mark.parametrize("start", [0.0, 1.7e9])
+@pytest.mark.parametrize(
+    "units", [("s", "s"), ("ms", "ms"), ("us", "us"), ("ns", "ns"), ("ns", "s"), ("s", "ms")]
+)
+def test_units_of_stamps_by_magnitude_and_rate(start, units):
+    scale = {"s": 1.0, "ms": 1e3, "us": 1e6, "ns": 1e9}
+    robot, camera = start + np.arange(0, 60, 0.008), start + 0.3 + np.arange(0, 58, 1 / 30)
+    assert clock_units(robot * scale[units[0]], camera * scale[units[1]]) == units

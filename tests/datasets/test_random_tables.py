@@ -11,7 +11,7 @@ from hecbench.errors import InputError
 from hecbench.preparation import load_recording
 from hecbench.recording import Mounting
 
-TABLES = int(os.environ.get("HECBENCH_TABLES", "60"))
+TABLES = int(os.environ.get("HECBENCH_TABLES", "40"))
 """As many as there is time for."""
 FACTOR = {"m": 1.0, "cm": 100.0, "mm": 1000.0}
 WORDS = {

@@ -124,22 +124,6 @@ def _by_word(table: Table) -> list[tuple[str, Table]]:
     return []
 
 
-def taking_turns(columns: Columns) -> list[Columns]:
-    """Two streams of one table whose rows take turns: even and odd ones are far apart; else the one."""
-    position = columns.poses[0].numbers[:, [3, 7, 11] if columns.poses[0].numbers.shape[1] > 7 else [0, 1, 2]]
-    even, odd = position[0::2], position[1::2]
-    if len(even) != len(odd) or len(even) < 5:
-        return [columns]
-    apart = np.linalg.norm(even.mean(0) - odd.mean(0))
-    if apart < 3 * max(np.linalg.norm(even.std(0)), np.linalg.norm(odd.std(0))):
-        return [columns]
-    poses = columns.poses[0]
-    return [
-        Columns(columns.source, [Poses(name, poses.numbers[k::2], poses.rotations, poses.unit)])
-        for k, name in enumerate(("robot (odd rows)", "target (even rows)"))
-    ]
-
-
 def _columns(table: Table, name: str) -> Columns:
     names, values = table.numbers()
     images = image_column(table)

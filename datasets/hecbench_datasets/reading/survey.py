@@ -11,7 +11,7 @@ import numpy as np
 
 from hecbench.errors import InputError
 from hecbench.exchange.conventions import HINTS_NAME
-from hecbench_datasets.reading.columns import Columns, recognise, taking_turns
+from hecbench_datasets.reading.columns import Columns, Poses, recognise
 from hecbench_datasets.reading.sources import IMAGE_SUFFIXES, natural
 from hecbench_datasets.reading.tables import TABLE_SUFFIXES, Table, read_table
 
@@ -70,8 +70,24 @@ def survey(path: Path) -> Survey:
         except InputError as error:
             found.faults.append(str(error))
     if len(found.streams) == 1 and len(found.streams[0].poses) == 1 and not pictures:
-        found.streams[:] = taking_turns(found.streams[0])
+        found.streams[:] = _taking_turns(found.streams[0])
     return found
+
+
+def _taking_turns(columns: Columns) -> list[Columns]:
+    """Two streams of one table whose rows take turns: even and odd ones are far apart; else the one."""
+    position = columns.poses[0].numbers[:, [3, 7, 11] if columns.poses[0].numbers.shape[1] > 7 else [0, 1, 2]]
+    even, odd = position[0::2], position[1::2]
+    if len(even) != len(odd) or len(even) < 5:
+        return [columns]
+    apart = np.linalg.norm(even.mean(0) - odd.mean(0))
+    if apart < 3 * max(np.linalg.norm(even.std(0)), np.linalg.norm(odd.std(0))):
+        return [columns]
+    poses = columns.poses[0]
+    return [
+        Columns(columns.source, [Poses(name, poses.numbers[k::2], poses.rotations, poses.unit)])
+        for k, name in enumerate(("robot (odd rows)", "target (even rows)"))
+    ]
 
 
 def _below(folder: Path) -> list[Path]:
@@ -80,7 +96,12 @@ def _below(folder: Path) -> list[Path]:
     waiting = [(folder, 1)]
     while waiting and len(files) < _MOST_FILES:
         place, level = waiting.pop(0)
-        entries = sorted(place.iterdir(), key=natural)
+        try:
+            entries = sorted(place.iterdir(), key=natural)
+        except OSError as error:
+            raise InputError(
+                f"{place}: cannot be read ({error.strerror}); check the path and its permissions"
+            ) from error
         files += [entry for entry in entries if entry.is_file() and entry.name != HINTS_NAME]
         if level < _DEEPEST:
             waiting += [(e, level + 1) for e in entries if e.is_dir() and not e.name.startswith(".")]

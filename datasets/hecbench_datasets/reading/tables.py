@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import re
+import zipfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +28,7 @@ TABLE_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".xlsx", ".json", *YAML_SUFFIX
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
 _LIST = re.compile(r"\s*(?:p|array)?[\[(]+(.*?)[\])]+\s*", re.DOTALL)
 _MOST_COLUMNS = 10_000
+_MOST_UNPACKED = 100 << 20
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,9 +132,7 @@ def _sheet(path: Path) -> list[list[str]]:
             f"{path}: a workbook needs pip install 'hecbench[excel]'; or save it as CSV"
         ) from None
     try:
-        sheet = openpyxl.load_workbook(
-            io.BytesIO(files.read_bytes(path)), read_only=True, data_only=True
-        ).active
+        sheet = openpyxl.load_workbook(_unpackable(path), read_only=True, data_only=True).active
         rows = [
             ["" if cell is None else str(cell) for cell in row] for row in sheet.iter_rows(values_only=True)
         ]
@@ -146,7 +146,7 @@ def _sheet(path: Path) -> list[list[str]]:
 def numpy_arrays(path: Path) -> Any:
     """The arrays of an NPY (named "") or NPZ file."""
     try:
-        loaded = np.load(io.BytesIO(files.read_bytes(path)), allow_pickle=False)
+        loaded = np.load(_unpackable(path), allow_pickle=False)
         return (
             {"": loaded} if isinstance(loaded, np.ndarray) else {name: loaded[name] for name in loaded.files}
         )
@@ -156,6 +156,20 @@ def numpy_arrays(path: Path) -> Any:
         raise InputError(
             f"{path}: is not readable NumPy data ({error}); write it with numpy.savez"
         ) from error
+
+
+def _unpackable(path: Path) -> io.BytesIO:
+    """The file, unless it is an archive that becomes too large when it is unpacked."""
+    content = io.BytesIO(files.read_bytes(path))
+    if zipfile.is_zipfile(content):
+        with zipfile.ZipFile(content) as archive:
+            size = sum(part.file_size for part in archive.infolist())
+        if size > _MOST_UNPACKED:
+            raise InputError(
+                f"{path}: unpacks to {size >> 20} MB, a table has at most {_MOST_UNPACKED >> 20}; cut it"
+            )
+    content.seek(0)
+    return content
 
 
 def _from_rows(rows: list[list[str]], source: str) -> Table:

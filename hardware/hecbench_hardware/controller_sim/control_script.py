@@ -23,7 +23,8 @@ from hecbench_hardware.controller_sim.motions import Motion, brake, move_joints,
 from hecbench_hardware.controller_sim.program import Program, ProgramRunner, Watchdog
 
 READY, DONE = 1, 2
-MARK = "def rtde_control"
+NAME = "rtde_control"
+MARK = f"def {NAME}("
 """How the text of this script is known."""
 _LEAVE = 255
 _REPEATED: Final = frozenset({6, 9, 10, 11, 24, 25, 26, 27, 38, 58, *range(66, 72)})

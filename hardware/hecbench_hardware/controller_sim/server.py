@@ -52,6 +52,8 @@ class _Connection:
     port: int
     channel: Channel
     outbox: bytes = b""
+    hears: bool = True
+    """Whether the client still takes data; what it sent before it left is read all the same."""
 
 
 @dataclass
@@ -167,7 +169,7 @@ class _Server:
 
     def send(self, connection: _Connection, data: bytes) -> None:
         """Send what the socket takes, and the rest when it takes more."""
-        if connection.socket not in self.connections:
+        if connection.socket not in self.connections or not connection.hears:
             return
         connection.outbox += data
         try:
@@ -175,8 +177,7 @@ class _Server:
         except BlockingIOError:
             sent = 0
         except OSError:
-            self.drop(connection)
-            return
+            connection.hears, sent = False, len(connection.outbox)
         connection.outbox = connection.outbox[sent:]
         if len(connection.outbox) > _DEAF_READER_BYTES:
             self.drop(connection, "it does not read its answers")

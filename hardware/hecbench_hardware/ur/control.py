@@ -52,7 +52,11 @@ class Control:
             if found := fault_of(stream.latest):
                 raise DeviceFault(found[0], name, found[1]) from None
             raise recovery.explained(name, str(error)) from None
-        offset = np.array(self.request("call", "getTCPOffset"))
+        try:
+            offset = np.array(self.request("call", "getTCPOffset"))
+        except HecbenchError:
+            self.worker.end()
+            raise
         self.flange_T_tcp: Array = se3.from_rotvec(offset[3:], offset[:3])
         stream.supervise(self._on_fault, self.worker.pulse.beat)
 

@@ -190,7 +190,7 @@ class UrRobot:
         check_motion(self.arm, line, limits, gap_m)
         vector = [*line.base_T_tcp[:3, 3].tolist(), *se3.so3_log(line.base_T_tcp[:3, :3]).tolist()]
         speed = min(speed, line.speed_m_s(limits.joint_speed_rad_s))
-        expected_s = motion_time_s(float(np.linalg.norm(line.shift_m)), speed, acceleration) + motion_time_s(
+        expected_s = motion_time_s(line.length_m, speed, acceleration) + motion_time_s(
             float(np.abs(np.diff(line.joints, axis=0)).sum(axis=0).max()),
             limits.joint_speed_rad_s,
             limits.joint_acceleration_rad_s2,

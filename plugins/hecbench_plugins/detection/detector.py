@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from hecbench.errors import InputError, TargetNotSeen
 from hecbench.recording import CameraModel, Recording
-from hecbench.targets import AprilTagTarget, CharucoTarget, ChessboardTarget, PointsTarget, Target
+from hecbench.targets import AprilTagTarget, CharucoTarget, ChessboardTarget, PointsTarget, Target, grid_shape
 from hecbench_plugins.detection import apriltag, charuco, chessboard, circles
 from hecbench_plugins.detection.intrinsics import calibrate
 from hecbench_plugins.detection.orientation import choose_turns, turned_grids
@@ -101,20 +101,6 @@ def _shows_circles(greys: Sequence[Grey | None], grid: tuple[int, int]) -> bool:
 def _looks_alike(columns: int, rows: int) -> bool:
     """Whether a chessboard with so many inner corners looks the same upside down."""
     return (columns + rows) % 2 == 0
-
-
-def grid_shape(points_m: Array) -> tuple[int, int] | None:
-    """(columns, rows) of points (P, 3) m that form a grid row by row, x along the columns, z = 0."""
-    if len(points_m) < 4 or points_m[:, 2].any():
-        return None
-    columns = int((np.abs(points_m[:, 1] - points_m[0, 1]) < 1e-9).sum())
-    rows, rest = divmod(len(points_m), columns)
-    if rest or columns < 2 or rows < 2:
-        return None
-    spacing = points_m[1, 0] - points_m[0, 0]
-    y, x = np.mgrid[:rows, :columns]
-    expected = np.stack([x.ravel(), y.ravel()], 1) * spacing + points_m[0, :2]
-    return (columns, rows) if spacing > 0 and np.allclose(points_m[:, :2], expected, atol=1e-6) else None
 
 
 def _calibrated(

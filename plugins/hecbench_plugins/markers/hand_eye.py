@@ -7,7 +7,7 @@ X = parent_T_camera and Y = carrier_T_target are constant; the hand poses H fold
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -15,15 +15,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
+from hecbench.agreement import contradiction
 from hecbench.errors import Refusal, SolverFailure
 from hecbench.estimate import Estimate
 from hecbench.recording import Recording
+from hecbench.standstills import one_per_robot_pose
 from hecbench_plugins.markers.target_poses import target_poses
 
 Array = NDArray[np.float64]
 
 MINIMUM_SAMPLES = 3
-_MOST_COMPARED = 400
+_MOST_COMPARED = 800
 """Samples whose motions are all formed: their number, and OpenCV's time, grow with the square."""
 MINIMUM_ROTATION_DEG = 1.0
 """Rms rotation that must remain about a second axis, ten times a good robot's noise, or nothing is
@@ -52,7 +54,7 @@ class PosedSamples:
 
     @cached_property
     def compared(self) -> PosedSamples:
-        """The samples whose motions are formed: these, or 400 evenly spread ones of more."""
+        """The samples whose motions are formed: these, or 800 evenly spread ones of more."""
         if len(self) <= _MOST_COMPARED:
             return self
         return self.subset(np.linspace(0, len(self) - 1, _MOST_COMPARED).astype(int))
@@ -72,7 +74,7 @@ class PosedSamples:
 
 
 def pose_pairs(recording: Recording) -> PosedSamples:
-    """The samples with a hand pose and a target pose, once they are known to determine X.
+    """The samples with a hand pose and a target pose, once they are known to determine X; one per robot pose.
 
     They are sorted by hand pose, whatever order they were taken in: the motions of a pair and of its reverse
     weigh translation noise differently, so methods on motions would otherwise depend on the order of the
@@ -81,13 +83,39 @@ def pose_pairs(recording: Recording) -> PosedSamples:
     Raises:
         Refusal: too few samples, or the hand does not rotate about two axes.
     """
-    hand, camera_T_target = recording.hand_poses(), target_poses(recording)
-    both = np.isfinite(hand).all((1, 2)) & np.isfinite(camera_T_target).all((1, 2))
-    hand, camera_T_target = hand[both], camera_T_target[both]
+    hand, camera_T_target = posed_samples(recording)
     order = np.lexsort(hand[:, :3].reshape(len(hand), -1).T)
     pairs = PosedSamples(hand[order], camera_T_target[order])
     require_two_rotation_axes(pairs)
     return pairs
+
+
+def posed_samples(recording: Recording) -> tuple[Array, Array]:
+    """H and camera_T_target, each (N, 4, 4) m, of the samples that have both; one per robot pose.
+
+    Raises:
+        Refusal: fewer than 3.
+    """
+    posed = replace(recording, camera_T_target=target_poses(recording))
+    both = _both(posed)
+    posed = posed.subset(np.flatnonzero(both)) if both.any() else posed
+    once = one_per_robot_pose(posed)
+    both = _both(once)
+    if both.sum() < MINIMUM_SAMPLES <= len(posed):
+        raise Refusal(f"the hand hardly rotates: {len(posed)} samples stand at {both.sum()} robot poses")
+    if both.sum() < MINIMUM_SAMPLES:
+        raise Refusal(
+            f"{both.sum()} samples have a robot and a target pose; at least {MINIMUM_SAMPLES} are needed"
+        )
+    assert once.camera_T_target is not None
+    return once.hand_poses()[both], once.camera_T_target[both]
+
+
+def _both(recording: Recording) -> NDArray[np.bool_]:
+    """Which samples have a robot pose and a target pose."""
+    assert recording.camera_T_target is not None
+    known = np.isfinite(recording.hand_poses()).all((1, 2))
+    return np.asarray(known & np.isfinite(recording.camera_T_target).all((1, 2)))
 
 
 def rotation_diversity_deg(rotation_logs: Array) -> Array:
@@ -104,9 +132,7 @@ def require_two_rotation_axes(pairs: PosedSamples) -> None:
     III).
     """
     if len(pairs) < MINIMUM_SAMPLES:
-        raise Refusal(
-            f"{len(pairs)} samples have a robot and a target pose; at least {MINIMUM_SAMPLES} are needed"
-        )
+        raise Refusal(f"{len(pairs)} samples are left; at least {MINIMUM_SAMPLES} are needed")
     for name, logs in zip(("hand", "target"), pairs.rotation_logs, strict=True):
         first, second, _ = np.append(rotation_diversity_deg(logs), 0.0)[:3]
         if first < MINIMUM_ROTATION_DEG:
@@ -142,7 +168,7 @@ def answer(
 
     Raises:
         Refusal: the answer is no rigid transform.
-        SolverFailure: it leaves as much rotation unexplained as the hand made.
+        SolverFailure: it contradicts the samples.
     """
     if not se3.is_transform(parent_T_camera):
         raise Refusal(
@@ -152,12 +178,8 @@ def answer(
     if carrier_T_target is None:
         carrier_T_target = se3.mean(carrier_T_targets)
     spread_deg = rotation_spread_deg(carrier_T_targets[:, :3, :3])
-    hand_deg = rotation_spread_deg(pairs.hand[:, :3, :3])
-    if spread_deg >= hand_deg:
-        raise SolverFailure(
-            f"the target still turns by {spread_deg:.3g} deg rms where the hand turned by {hand_deg:.3g}: "
-            "are the robot poses inverted, or the mounting wrong?"
-        )
+    if reason := contradiction(pairs.hand, pairs.camera_T_target, parent_T_camera, carrier_T_target):
+        raise SolverFailure(reason)
     offsets = carrier_T_targets[:, :3, 3] - carrier_T_targets[:, :3, 3].mean(0)
     evidence = {
         "samples": len(pairs),

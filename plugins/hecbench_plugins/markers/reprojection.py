@@ -8,12 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
+from hecbench.agreement import LARGEST_SHARE, share_left
 from hecbench.bundle.adjustment import Solution, adjust
 from hecbench.bundle.model import Noise, Problem, State, linearise, start
 from hecbench.errors import Refusal, SolverFailure
 from hecbench.estimate import Estimate
 from hecbench.lens import FixedSensor, Sensor, parameters_of
 from hecbench.recording import Recording
+from hecbench.standstills import one_per_robot_pose
 from hecbench_plugins.markers import single3d
 from hecbench_plugins.markers.hand_eye import pose_pairs
 from hecbench_plugins.markers.opencv_hand_eye import robot_world
@@ -24,20 +26,21 @@ Array = NDArray[np.float64]
 DEFAULT_NOISE = Noise(0.3, float(np.deg2rad(0.05)), 5e-4)
 """A corner, and a good arm: px, rad, m."""
 _STARTS = 2
-_EXPLAINS = 0.2
-"""Of the target's motion in the image that may remain; good data leave a few per cent."""
 _MOST_VOTES = 400
 """Poses compared each with each."""
 _AGREEING_RAD = np.deg2rad(8.0)
 
 
 def corner_problem(recording: Recording, prior_sigmas: Array | None = None) -> Problem:
-    """The samples with a robot pose and target points; with `prior_sigmas` (4 + D,) the intrinsics are free.
+    """The samples with a robot pose and target points, one per robot pose.
+
+    With `prior_sigmas` (4 + D,) the intrinsics are unknowns.
 
     Raises:
         Refusal: no corners, intrinsics or robot poses, or the samples do not determine X.
     """
     pose_pairs(recording)
+    recording = one_per_robot_pose(recording)
     camera, target, corners_px = recording.camera, recording.target, recording.corners_px
     if camera is None or camera.K is None or target is None or corners_px is None:
         raise Refusal("needs corners_px, target and camera.K")
@@ -67,18 +70,18 @@ def adjust_with_exact_robot(recording: Recording, problem: Problem) -> Solution:
         Refusal: no method gives a start.
         SolverFailure: what is left is not small against the target's own motion in the image.
     """
-    noise = Noise(DEFAULT_NOISE.observed)
+    recording, noise = one_per_robot_pose(recording), Noise(DEFAULT_NOISE.observed)
     starts = sorted(_starts(recording, problem), key=lambda state: linearise(problem, state, noise).cost)
     if not starts:
         raise Refusal("neither single3d nor shah gives a start on this recording")
     found = [adjust(problem, state, noise) for state in starts[:_STARTS]]
     best = min(found, key=lambda solution: solution.at.cost)
-    left_px = float(np.median(np.linalg.norm(best.at.residuals[problem.seen], axis=1)))
     centres_px = np.nanmean(problem.observed, axis=1)
-    moved_px = float(np.median(np.linalg.norm(centres_px - np.median(centres_px, axis=0), axis=1)))
-    if left_px > _EXPLAINS * moved_px:
+    left_px = np.linalg.norm(best.at.residuals[problem.seen], axis=1)
+    moved_px = np.linalg.norm(centres_px - np.median(centres_px, axis=0), axis=1)
+    if share_left(left_px, moved_px) > LARGEST_SHARE:
         raise SolverFailure(
-            f"leaves {left_px:.3g} px in the median where the target moved by {moved_px:.3g}: "
+            f"leaves {np.median(left_px):.3g} px in the median where the target moved by {np.median(moved_px):.3g}: "
             "are the robot poses inverted, or the mounting wrong?"
         )
     return best

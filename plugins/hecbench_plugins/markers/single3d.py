@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
+from hecbench.agreement import LARGEST_SHARE, percent, share_left
 from hecbench.errors import Refusal, SolverFailure
 from hecbench.estimate import Estimate, Termination
 from hecbench.recording import Recording
-from hecbench_plugins.markers.hand_eye import MINIMUM_ROTATION_DEG, rotation_diversity_deg
-from hecbench_plugins.markers.target_poses import target_poses
+from hecbench_plugins.markers.hand_eye import MINIMUM_ROTATION_DEG, posed_samples, rotation_diversity_deg
 
 Array = NDArray[np.float64]
 
@@ -103,12 +103,8 @@ def marker_positions(recording: Recording) -> MarkerPositions:
     Raises:
         Refusal: fewer than 3 samples, or the hand does not rotate about two axes.
     """
-    hand, camera_T_target = recording.hand_poses(), target_poses(recording)
-    both = np.isfinite(hand).all((1, 2)) & np.isfinite(camera_T_target).all((1, 2))
+    chosen, camera_T_target = posed_samples(recording)
     marker = np.zeros(3) if recording.target is None else recording.target.points_m.mean(0)
-    chosen = hand[both]
-    if len(chosen) < 3:
-        raise Refusal(f"{len(chosen)} samples have a robot and a target pose; at least 3 are needed")
     some = chosen[:: 1 + len(chosen) // _MOST_COMPARED, :3, :3]
     i, j = np.triu_indices(len(some), 1)
     logs = se3.so3_log(np.swapaxes(some[i], 1, 2) @ some[j])
@@ -118,7 +114,7 @@ def marker_positions(recording: Recording) -> MarkerPositions:
             f"the hand rotates by {diversity_deg[0]:.3g} deg rms about one axis and {diversity_deg[1]:.2g} "
             "about any other: add samples turned by 20 deg or more about a second axis"
         )
-    return MarkerPositions(chosen, se3.transform_points(camera_T_target[both], marker[None])[:, 0])
+    return MarkerPositions(chosen, se3.transform_points(camera_T_target, marker[None])[:, 0])
 
 
 def closed_form(positions: MarkerPositions, *, reference_projection: bool = False) -> Array:
@@ -177,14 +173,15 @@ def answer(
     """The estimate with its evidence: the rms distance left, and how far from coplanar the positions are.
 
     Raises:
-        SolverFailure: the distance left is as large as the marker's own motion.
+        SolverFailure: it contradicts the samples.
     """
     parent_T_camera, marker = positions.rest_given(rotation)
-    left_m = _rms(positions.residuals_m(parent_T_camera, marker))
-    moved_m = _rms(positions.points_c - positions.points_c.mean(0))
-    if left_m >= moved_m:
+    residuals_m = positions.residuals_m(parent_T_camera, marker)
+    left_m = _rms(residuals_m)
+    moved_m = np.linalg.norm(positions.points_c - positions.points_c.mean(0), axis=1)
+    if (share := share_left(np.linalg.norm(residuals_m, axis=1), moved_m)) > LARGEST_SHARE:
         raise SolverFailure(
-            f"leaves {1e3 * left_m:.3g} mm rms where the marker moved by {1e3 * moved_m:.3g}: "
+            f"leaves the typical marker {percent(share)} of its own motion away from where it was seen: "
             "are the robot poses inverted, or the mounting wrong?"
         )
     condition = float(np.linalg.cond(positions.eliminated.A))

@@ -12,6 +12,8 @@ from hecbench_plugins.perception.card import ModelCard
 PAGE = "README.md"
 
 _LIMITS = (
+    "The settings around it (sizes of the passes, thresholds) were chosen while looking at the recordings of the"
+    " figures: these are figures of development, not of a test.",
     "It was trained on drawn pictures alone. A robot with a cover, a dress pack or other colours may be seen in part.",
     "What a robot holds (a board, a gripper) is not robot. What lies behind it is guessed poorly.",
     "Pictures in which the robot takes less than about 2 % are often seen as pictures without a robot.",

@@ -17,7 +17,9 @@ _MINIMAL_POINTS = 4
 _CONFIDENCE = 0.9999
 _NEAR_M = 0.05
 """Points nearer to the camera than this count as that near."""
-_ROBUST = 0.25
+_STILL_M = 0.03
+"""A keypoint that moves less than this between two views stands still."""
+_ROBUST = 0.15
 """Of the limit: residuals beyond it count less (Cauchy)."""
 REFERENCE_WIDTH_PX = 640
 
@@ -28,20 +30,34 @@ class Sightings(NamedTuple):
     Attributes:
         points: (N, 3) m in the parent's frame.
         rays: (N, 2), x / z and y / z of their pixels without the lens.
-        view: (N,) and
-        keypoint: (N,), that each belongs to.
+        keypoint: (N,) that each is.
+        cluster: (N,) whose errors depend on each other: those of one view, unless `independent` found others.
         weight: (N,) in [0, 1].
     """
 
     points: Array
     rays: Array
-    view: NDArray[np.int64]
     keypoint: NDArray[np.int64]
+    cluster: NDArray[np.int64]
     weight: Array
 
     def select(self, which: NDArray[np.bool_]) -> Sightings:
         """Only these."""
         return Sightings._make(values[which] for values in self)
+
+
+def independent(seen: Sightings) -> Sightings:
+    """The sightings with weights and clusters that count a point which stands still once.
+
+    Where a keypoint does not move between views (the robot's base before a fixed camera), the network sees the same
+    picture of it again, and errs in the same way: n such sightings share the weight of one and are one cluster.
+    """
+    apart = np.linalg.norm(seen.points[:, None] - seen.points[None], axis=2)
+    same = (apart < _STILL_M) & (seen.keypoint[:, None] == seen.keypoint[None])
+    count = same.sum(1)
+    first = same.argmax(1)
+    cluster = np.where(count > 1, -1 - first, seen.cluster)
+    return seen._replace(cluster=cluster, weight=seen.weight / count)
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +126,7 @@ def refined(seen: Sightings, camera_T_parent: Array, limit: float) -> KeypointPo
         found = least_squares(residuals, np.zeros(6), loss="cauchy", f_scale=scale, x_scale="jac")
         parent_T_camera = se3.exp(found.x) @ start
     here = least_squares(residuals, found.x, max_nfev=1)  # its Jacobian is not scaled by the loss
-    covariance = _sandwich(here.jac, here.fun, scale, np.repeat(kept.view, 2))
+    covariance = _sandwich(here.jac, here.fun, scale, np.repeat(kept.cluster, 2))
     inliers = _apart(seen, se3.inverse(parent_T_camera)) < limit
     rms = float(np.sqrt(2 * (here.fun**2).mean()))
     return KeypointPose(parent_T_camera, covariance, inliers, rms)

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench.errors import InputError
-from hecbench.targets import AprilTagTarget, CharucoTarget, ChessboardTarget, PointsTarget, Target
+from hecbench.targets import AprilTagTarget, CharucoTarget, ChessboardTarget, PointsTarget, Target, grid_shape
 from hecbench_plugins.detection.charuco import board_of
-from hecbench_plugins.detection.detector import grid_shape
 
 _DOT, _FIRST_DOT = 0.5, 0.75
 """Diameter over spacing of the dots of a circle grid, and of the first one, which says where the grid begins."""

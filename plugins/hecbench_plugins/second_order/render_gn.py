@@ -26,7 +26,7 @@ from hecbench_plugins.second_order.mask_intervals import between_pixels, violate
 from hecbench_plugins.second_order.photometry import Photometry, tone_exponent
 from hecbench_plugins.second_order.silhouette import centroid_and_area, distances_at, silhouette_step
 from hecbench_plugins.second_order.unknowns import ExtendedPhotometry, Unknown, solve
-from hecbench_plugins.views.pyramid import View, linearised, prepare
+from hecbench_plugins.views.pyramid import RaggedMasks, View, linearised, prepare
 
 Array = NDArray[np.float64]
 
@@ -117,11 +117,15 @@ class RenderGN:
             return
         found = evidence.contour_found(views, end.descent.pose, trace)
         settled = colours or end.kind == "intervals"
-        if not settled or overlap < self.least_overlap or found < self.least_contour:
-            raise SolverFailure(
-                f"ended where drawing and mask overlap by {overlap:.2f} only and share {100 * found:.0f} % of the"
-                " contour: the start is too far off, or the masks show another robot or too little of it"
-            )
+        if settled and overlap >= self.least_overlap and found >= self.least_contour:
+            return
+        reason = (
+            f"ended where drawing and mask overlap by {overlap:.2f} only and share {100 * found:.0f} % of the"
+            " contour: the start is too far off, or the masks show another robot or too little of it"
+        )
+        if end.kind == "coverage" and overlap >= self.least_overlap:
+            raise RaggedMasks(reason, se3.inverse(end.descent.pose))
+        raise SolverFailure(reason)
 
     def _camera_inside(self, view: View, pose: Array, trace: Trace) -> bool:
         renderer = draw_counted(view, 4, pose, trace).renderer

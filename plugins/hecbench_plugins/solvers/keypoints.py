@@ -44,7 +44,7 @@ class Keypoints:
 
     model: str | None = None
     least_trust: float = 0.2
-    limit_px: float = 12.0
+    limit_px: float = 20.0
     rounds: int = 1000
     fewest: int = 12
     least_kinds: int = 4
@@ -58,7 +58,12 @@ class Keypoints:
             Refusal: no network knows the robot, or too few keypoints are trusted.
             SolverFailure: too few of them agree, or they do not determine the camera.
         """
-        from hecbench_plugins.perception.keypoint_pose import REFERENCE_WIDTH_PX, consensus, refined
+        from hecbench_plugins.perception.keypoint_pose import (
+            REFERENCE_WIDTH_PX,
+            consensus,
+            independent,
+            refined,
+        )
 
         camera = recording.camera
         assert camera is not None
@@ -70,6 +75,7 @@ class Keypoints:
                 " needed: give more views, or views that show the whole robot"
             )
         limit = self.limit_px * camera.width / REFERENCE_WIDTH_PX / float(camera.K[0, 0])
+        seen = independent(seen)
         answer = refined(seen, consensus(seen, limit, self.rounds, rng), limit)
         share = float(answer.inliers.mean())
         kinds = len(np.unique(seen.keypoint[answer.inliers]))
@@ -129,7 +135,7 @@ class Keypoints:
                 if len(sure)
                 else pixels[:, 0]
             )
-            rows.append(Sightings(points, rays, np.full(len(sure), sample), sure, sight.trust[sure]))
+            rows.append(Sightings(points, rays, sure, np.full(len(sure), sample), sight.trust[sure]))
         if not rows:
             raise Refusal(
                 f"{recording.name}: no keypoint is trusted in {views} images that have joints: another robot?"

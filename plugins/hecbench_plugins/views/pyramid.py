@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench.errors import InputError, Refusal
+from hecbench.errors import InputError, Refusal, SolverFailure
 from hecbench.recording import Recording
 from hecbench.rendering import Renderer, RenderMesh
 from hecbench.rendering.undistort import Undistortion, shrunk_intrinsics
@@ -28,6 +28,14 @@ _SMALLEST_HIDING_PX, _SOFT_EDGE_PX = 9, 2
 
 class NoMask(Refusal):
     """An image without a mask whose background is too lively to tell the robot by it."""
+
+
+class RaggedMasks(SolverFailure):
+    """Masks whose contour is nowhere that of the robot to the pixel, and an end that they leave in doubt."""
+
+    def __init__(self, message: str, parent_T_camera: Array) -> None:
+        super().__init__(message)
+        self.parent_T_camera = parent_T_camera
 
 
 @lru_cache(maxsize=4)

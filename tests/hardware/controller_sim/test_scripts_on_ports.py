@@ -21,6 +21,7 @@ PROGRAMS = [
     f"def f():\n q = {Q}\n movej(q, a=1.4, v=1.05)\nend\n",
     f"def f():\r\n movej({Q})\r\nend\r\n",
     f"def f():\n if True:\n movej({Q})\n end\nend\n",
+    f"def rtde_control_loop():\n movej({Q})\nend\n",
     f"def f():\ndef g():\nmovej({Q})\nend\ng()\nend\n",
 ]
 
@@ -46,6 +47,13 @@ def test_one_connection_takes_one_program_after_another(dial, receive, wait_unti
     wait_until(lambda: receive.getDigitalOutState(3))
     client.sendall(b"set_digital_out(3, False)\n")
     wait_until(lambda: not receive.getDigitalOutState(3))
+
+
+@pytest.mark.parametrize("port", [30001, 30002, 30003])
+def test_a_client_that_sends_and_hangs_up(dial, receive, wait_until, port):
+    for number in range(5):
+        dial(port, f"set_standard_digital_out({number}, True)\n".encode()).close()
+        wait_until(lambda number=number: receive.getDigitalOutState(number))
 
 
 def test_a_program_in_pieces(dial, receive, wait_until):
@@ -115,7 +123,7 @@ def test_local_control_takes_no_programs(dial, controller, wait_until):
 
 
 def test_a_client_that_leaves_in_the_middle_is_on_record(dial, controller, wait_until):
-    dial(30002, b"def half():\n movej(").shutdown(socket.SHUT_WR)
+    dial(30002, b"def half():\n movej(").close()
     wait_until(lambda: "the client left in the middle of 'def half():'" in controller.ask("log"))
 
 

@@ -157,7 +157,7 @@ def test_few_samples_are_no_crash(kept, good, found):
 def test_without_target_or_poses(good):
     recording = good("arm", 0)
     bare = replace(recording, target=None, corners_px=None, camera=None)
-    assert {f.id for f in check(bare)} >= {"joints_vs_pose", "rotation_diversity"}
+    assert {f.id for f in check(bare)} >= {"joints_vs_pose", "units"}
     assert check(replace(bare, base_T_flange=None, robot=None)) == []
 
 

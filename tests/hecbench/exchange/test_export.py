@@ -15,7 +15,7 @@ from hecbench import registry, se3
 from hecbench.errors import InputError
 from hecbench.estimate import Estimate, Status, Termination
 from hecbench.exchange import export
-from hecbench.recording import Mounting
+from hecbench.recording import CameraModel, Mounting
 from hecbench.specs import ExporterSpec, Kind
 
 TO_LINK = {"child": "camera_link", "optical": "camera_color_optical_frame"}
@@ -155,3 +155,36 @@ def test_names_from_elsewhere_cannot_leave_the_comment(estimate):
     text = exporter("moveit_ros2").write(replace(estimate, recording='x"""\nimport os --> \n'), {})
     assert [node.module for node in ast.walk(ast.parse(text)) if isinstance(node, ast.ImportFrom)]
     assert not [node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.Import)]
+
+
+@pytest.mark.parametrize(
+    ("distortion", "model", "name", "length"),
+    [
+        ([], "opencv", "plumb_bob", 5),
+        ([0.1, -0.2, 0.001, 0.002], "opencv", "plumb_bob", 5),
+        ([0.1, -0.2, 0.001, 0.002, 0.3], "opencv", "plumb_bob", 5),
+        ([0.1] * 8, "opencv", "rational_polynomial", 8),
+        ([0.1, 0.01, 0.001, 0.0001], "equidistant", "equidistant", 4),
+    ],
+)
+def test_camera_info_names_the_lens_as_ros_does(distortion, model, name, length):
+    K = np.array([[600.0, 0, 320], [0, 610, 240], [0, 0, 1]])
+    camera = CameraModel(640, 480, K, np.array(distortion), model)
+    found = yaml.safe_load(
+        export.camera_info(Estimate(np.eye(4), camera=camera), {"optical": "left_optical_frame"})
+    )
+    assert (found["image_width"], found["image_height"], found["camera_name"]) == (640, 480, "left")
+    np.testing.assert_array_equal(np.reshape(found["camera_matrix"]["data"], (3, 3)), K)
+    assert found["distortion_model"] == name
+    coefficients = found["distortion_coefficients"]["data"]
+    assert len(coefficients) == length
+    np.testing.assert_array_equal(coefficients[: len(distortion)], distortion)
+    np.testing.assert_array_equal(np.reshape(found["projection_matrix"]["data"], (3, 4))[:, :3], K)
+
+
+def test_a_lens_without_a_name_in_ros_is_refused():
+    camera = CameraModel(640, 480, np.array([[600.0, 0, 320], [0, 610, 240], [0, 0, 1]]), np.full(12, 0.01))
+    with pytest.raises(InputError, match="12 coefficients"):
+        export.camera_info(Estimate(np.eye(4), camera=camera), {})
+    with pytest.raises(InputError, match="no camera with K"):
+        export.camera_info(Estimate(np.eye(4)), {})

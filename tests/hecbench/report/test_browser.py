@@ -1,7 +1,6 @@
 """The page in a real browser: no error on the console, the verdict without scrolling, tables that sort."""
 
 import json
-import shutil
 from pathlib import Path
 
 import numpy as np
@@ -13,25 +12,6 @@ from hecbench.report import html, pictures
 from hecbench.running import calibrating
 from hecbench.running.solving import Options
 from hecbench.specs import Kind, SolverSpec, SuiteSpec
-
-webdriver = pytest.importorskip("selenium.webdriver")
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory):
-    programs = [shutil.which(name) for name in ("chromium", "chromium-browser", "google-chrome")]
-    driver = shutil.which("chromedriver")
-    if driver is None or not any(programs):
-        pytest.skip("needs Chromium and chromedriver")
-    options = webdriver.ChromeOptions()
-    options.binary_location = next(filter(None, programs))
-    profile = tmp_path_factory.mktemp("profile")
-    for argument in ("--headless=new", "--no-sandbox", "--disable-gpu", f"--user-data-dir={profile}"):
-        options.add_argument(argument)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    started = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
-    yield started
-    started.quit()
 
 
 def calibrated(folder: Path, recording, names):

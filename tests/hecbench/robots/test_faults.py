@@ -145,6 +145,7 @@ def test_refused_with_place_and_cure(load, text, reason):
         b'\n\n<?xml version="1.0"?><robot><link name="a"/></robot>',
         b'\xef\xbb\xbf<robot><link name="a"/></robot>',
         '<?xml version="1.0" encoding="utf-16"?><robot><link name="a"/></robot>'.encode("utf-16"),
+        b'<robot xmlns="http://drake.mit.edu"><link name="a"/></robot>',
         b'<robot drake:x="1"><link name="a" drake:y="2"><drake:z/></link></robot>',
     ],
 )

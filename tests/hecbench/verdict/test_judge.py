@@ -79,8 +79,10 @@ def test_truth_does_not_enter(rig):
     estimates = [answer(rig, "tsai", 2.0, None), answer(rig, "bundle")]
     wrong = [replace(e, errors={"tre_mm": float(i)}) for i, e in enumerate(estimates)]
     first, second = (judge(rig, *each).to_json() for each in (estimates, wrong))
-    first.pop("estimates"), second.pop("estimates")
+    first.pop("estimates")
+    kept = [estimate["errors"] for estimate in second.pop("estimates")]
     assert first == second
+    assert {"tre_mm": 1.0} in kept
 
 
 def test_a_robot_that_is_seen_elsewhere_makes_the_answer_doubtful(rig):
@@ -157,6 +159,14 @@ def test_without_an_answer_there_is_still_a_verdict(rig, tmp_path):
     assert found.grade is Grade.DO_NOT_USE
     assert found.to_json()["parent_T_camera"] is None
     assert found.reasons == ["tsai: the hand hardly rotates"]
+
+
+def test_the_recommended_answer_comes_first_in_a_list(rig):
+    """Also before one with its own camera that predicts better, so that a script that takes the first is safe."""
+    fixed, free = freed(rig, gain=0.9, sigma_ratio=0.1)
+    found = judge(rig, free, fixed)
+    assert [e.solver for e in found.estimates] == ["bundle_intrinsics", "bundle"]
+    assert [e.solver for e in found.recommended_first(found.estimates)] == ["bundle", "bundle_intrinsics"]
 
 
 def test_file_round_trip(rig, tmp_path):

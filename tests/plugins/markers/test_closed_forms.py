@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hecbench_plugins.markers import hand_eye
 from hecbench_plugins.markers.hand_eye import PosedSamples
 from hecbench_plugins.markers.opencv_hand_eye import without_half_turns
 from scipy.spatial.transform import Rotation
@@ -112,8 +113,12 @@ def test_tsai_says_when_its_range_of_angles_is_missed(rng):
     assert "17 to 116 deg" in estimate.reason
 
 
-def test_answers_are_proper_rotations_under_heavy_noise(spec):
-    """At a signal-to-noise ratio near one OpenCV's Park returns reflections; here none has status ok."""
+def test_answers_are_proper_rotations_under_heavy_noise(spec, monkeypatch):
+    """At a signal-to-noise ratio near one OpenCV's Park returns reflections; here none is an answer.
+
+    Such noise contradicts any answer: that verdict is off, so that the algebra is seen.
+    """
+    monkeypatch.setattr(hand_eye, "contradiction", lambda *arguments: None)
     rng = np.random.default_rng(11)
     corrected = answered = 0
     for _ in range(40):

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 from hecbench_plugins.perception import choice
-from hecbench_plugins.perception.keypoint_pose import Sightings, consensus, refined
+from hecbench_plugins.perception.keypoint_pose import Sightings, consensus, independent, refined
 from hecbench_plugins.segmenters.learned import Learned
 from hecbench_plugins.solvers.keypoints import Keypoints
 from hecbench_plugins.translators.learned import Learned as Translator
@@ -102,11 +102,20 @@ def test_the_covariance_is_that_of_the_errors():
         points = rng.uniform(-0.5, 0.5, (200, 3))
         p = se3.transform_points(truth, points)
         rays = p[:, :2] / p[:, 2:] + rng.normal(0, 0.002, (200, 2))
-        seen = Sightings(points, rays, np.repeat(np.arange(20), 10), np.tile(np.arange(10), 20), np.ones(200))
+        seen = Sightings(points, rays, np.tile(np.arange(10), 20), np.repeat(np.arange(20), 10), np.ones(200))
         answer = refined(seen, consensus(seen, 0.02, 100, rng), 0.02)
         error = se3.log(se3.inverse(truth) @ se3.inverse(answer.parent_T_camera))
         normalised.append(error @ np.linalg.solve(answer.covariance, error))
     assert 4 < np.median(normalised) < 12  # chi-square of 6: 5.3; 20 clusters make it a little larger
+
+
+def test_a_point_that_stands_still_counts_once():
+    points = np.array([[0, 0, 0.0], [0, 0, 0.01], [1, 0, 0], [0, 0, 0]])
+    seen = Sightings(points, np.zeros((4, 2)), np.array([0, 0, 0, 1]), np.array([5, 6, 7, 5]), np.ones(4))
+    found = independent(seen)
+    np.testing.assert_array_equal(found.weight, [0.5, 0.5, 1, 1])
+    assert found.cluster[0] == found.cluster[1] != found.cluster[2]
+    assert list(found.cluster[2:]) == [7, 5]
 
 
 def test_masks_of_every_image_and_a_note_where_there_is_no_robot(lit):

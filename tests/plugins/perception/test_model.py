@@ -35,7 +35,7 @@ def spoil(folder, weights=None, **changes):
 
 def test_masks_of_drawn_robots_are_right(network):
     maker, overlaps = PictureMaker(Family.of(["ur5e", "ur3e"]), 224, 99), []
-    while len(overlaps) < 20:
+    while len(overlaps) < 10:
         example = maker.example()
         truth = np.kron(example.shares[..., -1] > 127, np.ones((2, 2), bool))
         if truth.mean() > 0.05:
@@ -49,17 +49,17 @@ def test_pictures_without_a_robot_have_empty_masks(network):
     pictures = [np.rint(255 * maker._background(448)).astype(np.uint8) for _ in range(EMPTY_PICTURES)]
     seen = [network.see(picture) for picture in pictures]
     hallucinated = [n for n, sight in enumerate(seen) if (sight.visible() > 0.5).any() or sight.whole().any()]
-    assert len(hallucinated) <= 1
+    assert not hallucinated
 
 
 def test_photographs_without_this_robot_have_empty_masks(network, shared):
     cv2 = pytest.importorskip("cv2")
     folders = ("apriltag_photos", "industrial_10x10", "pupil_tags", "visp_franka")
     paths = [p for name in folders for p in sorted((shared / "data" / name).rglob("*.[jp][pn]*g"))]
-    images = [image for path in paths if (image := cv2.imread(str(path))) is not None]
-    assert len(images) >= EMPTY_PICTURES
+    images = [image for path in paths if (image := cv2.imread(str(path))) is not None][-EMPTY_PICTURES:]
+    assert len(images) == EMPTY_PICTURES
     seen = [(network.see(np.ascontiguousarray(image[..., ::-1])).visible() > 0.5).any() for image in images]
-    assert np.mean(seen) <= 0.1
+    assert sum(seen) == 0
 
 
 def test_the_mask_moves_with_the_robot(network):

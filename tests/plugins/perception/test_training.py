@@ -96,7 +96,7 @@ def test_an_interrupted_run_goes_on(run, crane, tmp_path):
 
 
 def test_it_learns(crane, tmp_path):
-    training = trained(tmp_path, crane, steps=100, rate=3e-3, batch=8, capacity=32)
+    training = trained(tmp_path, crane, steps=60, rate=3e-3, batch=8, capacity=32)
     first = Training(plan(tmp_path / "other", crane), lambda line: None)
     first.pool = training.pool
 

@@ -33,9 +33,11 @@ from hecbench_hardware.controller_sim.urscript.syntax import (
 )
 from hecbench_hardware.controller_sim.urscript.values import (
     Value,
+    bounded,
     combine,
     copied,
     item_of,
+    items_in,
     pose_from,
     signed,
     text_of,
@@ -51,6 +53,8 @@ _OLD_ARRAYS = {"digital_out": "set_digital_out", "analog_out": "set_analog_out"}
 STRUCT = "struct"
 """The function that makes a struct of its keywords."""
 _CALL_DEPTH = 40
+_CALL_STATEMENTS, _ITEMS_PER_STATEMENT = 8, 8
+"""What a function of the controller, and arithmetic of a list, count for in a thread's share of a cycle."""
 _BREAK, _CONTINUE = object(), object()
 
 
@@ -151,7 +155,9 @@ class Machine(Scheduler):
             raise ScriptError(f"{statement.word} needs a thread, not {text_of(thread)}")
 
     def _assign(self, statement: Assign, value: Value, scope: Scope) -> Steps:
-        target, value = statement.target, copied(value)
+        target, value = statement.target, copied(bounded(value))
+        if isinstance(value, list | dict) and self.current:
+            self.current.budget -= items_in(value) // _ITEMS_PER_STATEMENT
         if isinstance(target, Name):
             scope.assign(target.name, value, statement.scope)
             return
@@ -164,12 +170,14 @@ class Machine(Scheduler):
             if not isinstance(holder, dict) or target.name not in holder:
                 raise ScriptError(f"{text_of(holder)} has no member '{target.name}'")
             holder[target.name] = value
+            bounded(holder)
             return
         *outer, last = (yield from self._values(target.indices, scope)) or [None]
         for index in outer:
             holder = item_of(holder, index)
         item_of(holder, last)
         holder[int(last)] = value
+        bounded(holder)
 
     # expressions
 
@@ -189,7 +197,7 @@ class Machine(Scheduler):
             return holder
         if isinstance(node, ListOf):
             items = yield from self._values(node.items, scope)
-            return pose_from(items) if node.is_pose else items
+            return pose_from(items) if node.is_pose else bounded(items)
         if isinstance(node, Unary):
             return signed(node.operator, (yield from self._value(node.operand, scope)))
         if isinstance(node, Member):
@@ -212,7 +220,10 @@ class Machine(Scheduler):
             if truth(left) is (node.operator == "or"):
                 return left
             return truth((yield from self._value(node.right, scope)))
-        return combine(node.operator, left, (yield from self._value(node.right, scope)))
+        result = combine(node.operator, left, (yield from self._value(node.right, scope)))
+        if isinstance(result, list) and self.current:
+            self.current.budget -= items_in(result) // _ITEMS_PER_STATEMENT
+        return result
 
     def _call(self, node: Call, scope: Scope) -> Steps:
         arguments = yield from self._values(node.arguments, scope)
@@ -221,11 +232,12 @@ class Machine(Scheduler):
             keywords[name] = yield from self._value(argument, scope)
         closure = scope.function(node.name)
         if closure is None and node.name == STRUCT:
-            return {name: copied(value) for name, value in keywords.items()}
-        if closure is None:
-            return (yield from self._library[node.name].call(self, arguments, keywords))
+            return bounded({name: copied(value) for name, value in keywords.items()})
         thread = self.current
         assert thread
+        if closure is None:
+            thread.budget -= _CALL_STATEMENTS
+            return (yield from self._library[node.name].call(self, arguments, keywords))
         if thread.depth >= _CALL_DEPTH:
             raise ScriptError(f"more than {_CALL_DEPTH} calls within each other")
         inner = yield from self._bound(closure, arguments, keywords)

@@ -9,7 +9,7 @@ from hecbench_hardware.controller_sim.arm import ScriptError
 from hecbench_hardware.controller_sim.urscript.syntax import Function
 from hecbench_hardware.controller_sim.urscript.values import Value
 
-_VARIABLES = 5000
+_VARIABLES = 1000
 
 
 @dataclass

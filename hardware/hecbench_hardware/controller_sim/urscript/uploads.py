@@ -6,7 +6,7 @@ import re
 
 from hecbench_hardware.controller_sim.arm import ScriptError
 from hecbench_hardware.controller_sim.channel import complete_lines
-from hecbench_hardware.controller_sim.control_script import MARK, ControlScript
+from hecbench_hardware.controller_sim.control_script import MARK, NAME, ControlScript
 from hecbench_hardware.controller_sim.program import Program, ProgramRunner
 from hecbench_hardware.controller_sim.urscript.check import check_calls
 from hecbench_hardware.controller_sim.urscript.library import LIBRARY, motion
@@ -74,7 +74,7 @@ def start_program(runner: ProgramRunner, text: str) -> None:
 def compiled(runner: ProgramRunner, text: str) -> tuple[Program, str, bool]:
     """The program of a text, its name, and whether it is a secondary one; raises `ScriptError`."""
     if MARK in text:
-        return ControlScript(runner, text).run(), MARK.split()[1], False
+        return ControlScript(runner, text).run(), NAME, False
     body = parse(text)
     known = {*LIBRARY, STRUCT}
     check_calls(body, known)

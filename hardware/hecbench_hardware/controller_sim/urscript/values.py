@@ -15,7 +15,8 @@ from hecbench_hardware.controller_sim.geometry import pose_of, vector_of
 Value = Any
 """bool, int, float, str, list of values, `Pose`, dict (a struct), `None` (what a procedure returns) or a thread."""
 
-TEXT_CHARACTERS, LIST_ITEMS = 1 << 16, 10_000
+TEXT_CHARACTERS, LIST_ITEMS = 1 << 14, 4096
+"""The longest text, and the most items of a list with all lists in it."""
 _EXACT_INT = 1 << 53
 
 
@@ -122,9 +123,20 @@ def bounded(value: Value) -> Value:
         return float(value)
     if isinstance(value, str) and len(value) > TEXT_CHARACTERS:
         raise ScriptError(f"a text of more than {TEXT_CHARACTERS} characters")
-    if isinstance(value, list) and len(value) > LIST_ITEMS:
+    if isinstance(value, list | dict) and items_in(value) > LIST_ITEMS:
         raise ScriptError(f"a list of more than {LIST_ITEMS} items")
     return value
+
+
+def items_in(value: Value) -> int:
+    """Items of a list or struct and of those within it; counted no further than is allowed."""
+    count, parts = 0, [value]
+    while parts and count <= LIST_ITEMS:
+        part = parts.pop()
+        inner = part.values() if isinstance(part, dict) else part
+        count += len(inner)
+        parts += [item for item in inner if isinstance(item, list | dict)]
+    return count
 
 
 def _modulo(a: float, b: float) -> float:

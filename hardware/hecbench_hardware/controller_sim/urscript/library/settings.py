@@ -12,7 +12,7 @@ from hecbench_hardware.controller_sim.program import Watchdog
 from hecbench_hardware.controller_sim.signals import INPUTS, RobotMode
 from hecbench_hardware.controller_sim.urscript.functions import builtins
 from hecbench_hardware.controller_sim.urscript.machine import Machine
-from hecbench_hardware.controller_sim.urscript.values import Value, number, pose, truth, vector
+from hecbench_hardware.controller_sim.urscript.values import Value, number, pose, text, truth, vector
 
 _ACTIONS = ("ignore", "pause", "stop")
 
@@ -95,9 +95,10 @@ def rtde_set_watchdog(
 ) -> None:
     """End or pause the program when a client writes an input less often."""
     hertz = number(min_frequency, "min_frequency")
-    if variable_name not in INPUTS or not hertz > 0 or action not in _ACTIONS:
+    verb = text(action, "action").lower()
+    if text(variable_name, "variable_name") not in INPUTS or not hertz > 0 or verb not in _ACTIONS:
         raise ScriptError(f"it takes an RTDE input, a frequency above 0 and one of {', '.join(_ACTIONS)}")
-    m.runner.watchdog = Watchdog(variable_name, hertz, action, m.runner.wall_s)
+    m.runner.watchdog = Watchdog(variable_name, hertz, verb, m.runner.wall_s)
 
 
 def set_pos(m: Machine, q: Value) -> None:

@@ -1,0 +1,197 @@
+"""A recording in 3D: the robot at each sample, the target, and the camera where every method places it (viser)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hecbench import files, se3
+from hecbench.errors import HecbenchError, InputError
+from hecbench.estimate import Estimate
+from hecbench.recording import Mounting, Recording
+from hecbench.robots.posed import PosedRobot
+from hecbench.running.isolation import stdout_to_stderr
+
+Array = NDArray[np.float64]
+
+_BOLD_RGB, _RIVAL_RGB, _TARGET_RGB = (20, 120, 60), (150, 160, 175), (255, 120, 30)
+_FRUSTUM_M = 0.12
+_WIDEST_PX = 640
+
+
+@dataclass(eq=False)
+class Stage:
+    """What a viser server shows of a prepared recording; everything in the frame of the robot's base.
+
+    Attributes:
+        server: of viser.
+        recording: with robot poses.
+        estimates: with answers; the first is drawn bold and carries the photograph.
+    """
+
+    server: Any
+    recording: Recording
+    estimates: Sequence[Estimate]
+    _links: Array | None = field(default=None, init=False)
+    _meshes: dict[int, list[Any]] = field(default_factory=dict, init=False)
+    _frusta: list[Any] = field(default_factory=list, init=False)
+
+    def __post_init__(self) -> None:
+        scene = self.server.scene
+        scene.set_up_direction("+z")
+        scene.add_frame("/base", axes_length=0.15, axes_radius=0.004)
+        self._add_robot()
+        for number, estimate in enumerate(self.estimates):
+            self._add_camera(number, estimate)
+        self._add_controls()
+        self._look_on()
+        self.show(int(self.samples[0]))
+
+    @property
+    def samples(self) -> NDArray[np.int64]:
+        """Those with a robot pose."""
+        assert self.recording.base_T_flange is not None
+        return np.flatnonzero(np.isfinite(self.recording.base_T_flange).all((1, 2)))
+
+    def _look_on(self) -> None:
+        """The first view: from above the side, far enough to hold the robot and the recommended camera."""
+        X = self.estimates[0].parent_T_camera
+        assert X is not None
+        assert self.recording.base_T_flange is not None
+        hands = self.recording.base_T_flange[self.samples, :3, 3]
+        away = X[:3, 3] if self.recording.mounting is Mounting.EYE_TO_HAND else hands[0]
+        middle = (hands.mean(0) + away) / 2
+        reach = max(float(np.linalg.norm(away - hands.mean(0))), 1.0)
+        self.server.initial_camera.look_at = middle
+        self.server.initial_camera.position = middle + reach * np.array([1.0, 0.3, 0.7])
+
+    def _add_robot(self) -> None:
+        """The links' meshes, where the model and the joints are known."""
+        try:
+            robot = PosedRobot.of(self.recording)
+        except HecbenchError:  # a recording of poses alone: the flange's frame stands for the robot
+            self.server.scene.add_frame("/flange", axes_length=0.1, axes_radius=0.003)
+            return
+        self._links = robot.link_poses(robot.joints_rad)
+        for number, part in enumerate(robot.model.parts):
+            link = robot.model.links.index(part.link)
+            colour = tuple(round(255 * value) for value in part.colour)
+            mesh = self.server.scene.add_mesh_simple(
+                f"/robot/{number}",
+                np.asarray(part.vertices, np.float32),
+                np.asarray(part.faces),
+                color=colour,
+            )
+            self._meshes.setdefault(link, []).append(mesh)
+
+    def _add_camera(self, number: int, estimate: Estimate) -> None:
+        camera = estimate.camera or self.recording.camera
+        fov, aspect = 0.8, 4 / 3
+        if camera is not None:
+            aspect = camera.width / camera.height
+        if camera is not None and camera.K is not None:
+            fov = 2 * float(np.arctan(camera.height / 2 / camera.K[1, 1]))
+        frustum = self.server.scene.add_camera_frustum(
+            f"/cameras/{estimate.solver}",
+            fov,
+            aspect,
+            scale=_FRUSTUM_M * (1.5 if number == 0 else 1.0),
+            thickness=4.0 if number == 0 else 1.5,
+            thickness_units="screen",
+            color=_BOLD_RGB if number == 0 else _RIVAL_RGB,
+        )
+        frustum.on_click(lambda event, name=estimate.solver: self._say_distances(name))
+        self._frusta.append(frustum)
+
+    def _add_controls(self) -> None:
+        gui = self.server.gui
+        slider = gui.add_slider("sample", 0, len(self.samples) - 1, 1, 0) if len(self.samples) > 1 else None
+        opacity = gui.add_slider("robot's opacity", 0.1, 1.0, 0.05, 1.0)
+        self._text = gui.add_markdown(f"**{self.estimates[0].solver}** bold; click a camera for distances")
+        if slider is not None:
+            slider.on_update(lambda event: self.show(int(self.samples[slider.value])))
+        opacity.on_update(lambda event: self._fade(opacity.value))
+
+    def _fade(self, opacity: float) -> None:
+        for mesh in (mesh for meshes in self._meshes.values() for mesh in meshes):
+            mesh.opacity = opacity
+
+    def _say_distances(self, solver: str) -> None:
+        centres = {
+            e.solver: e.parent_T_camera[:3, 3] for e in self.estimates if e.parent_T_camera is not None
+        }
+        rows = [
+            f"- {name}: {1e3 * float(np.linalg.norm(centre - centres[solver])):.2g} mm"
+            for name, centre in centres.items()
+            if name != solver
+        ]
+        self._text.content = f"**{solver}**: camera centres apart\n" + "\n".join(rows)
+
+    def show(self, sample: int) -> None:
+        """Place everything as it was at a sample."""
+        assert self.recording.base_T_flange is not None
+        flange = self.recording.base_T_flange[sample]
+        moves = self.recording.mounting is Mounting.EYE_IN_HAND
+        base_T_parent = flange if moves else np.eye(4)
+        if self._links is not None:
+            for link, meshes in self._meshes.items():
+                for mesh in meshes:
+                    _place(mesh, base_T_parent @ self._links[sample, link])
+        for frustum, estimate in zip(self._frusta, self.estimates, strict=True):
+            assert estimate.parent_T_camera is not None
+            _place(frustum, base_T_parent @ estimate.parent_T_camera)
+        self._frusta[0].image = self._photograph(sample)
+        self._show_target(flange if not moves else np.eye(4))
+
+    def _show_target(self, base_T_carrier: Array) -> None:
+        target, placed = self.recording.target, self.estimates[0].carrier_T_target
+        if target is None or placed is None:
+            return
+        points = se3.transform_points(base_T_carrier @ placed, target.points_m).astype(np.float32)
+        colours = np.tile(np.array(_TARGET_RGB, np.uint8), (len(points), 1))
+        self.server.scene.add_point_cloud("/target", points, colours, point_size=0.004)
+
+    def _photograph(self, sample: int) -> NDArray[np.uint8] | None:
+        if self.recording.images is None or self.recording.images[sample] is None:
+            return None
+        picture = self.recording.image(sample)
+        step = max(1, picture.shape[1] // _WIDEST_PX)
+        return np.ascontiguousarray(picture[::step, ::step])
+
+    def save(self, path: Path) -> None:
+        """The scene as one file that opens without hecbench: ``.html``, or viser's own ``.viser``."""
+        serializer = self.server.get_scene_serializer()
+        if path.suffix == ".html":
+            files.write_text(path, serializer.as_html())
+        elif path.suffix == ".viser":
+            files.write_bytes(path, serializer.serialize())
+        else:
+            raise InputError(f"--save {path}: give a name that ends in .html or .viser")
+
+    def close(self) -> None:
+        """End the server."""
+        with stdout_to_stderr():
+            self.server.stop()
+
+
+def _place(handle: Any, base_T_thing: Array) -> None:
+    handle.wxyz, handle.position = se3.to_quat_wxyz(base_T_thing), base_T_thing[:3, 3]
+
+
+def open_server(host: str, port: int) -> Any:
+    """A viser server.
+
+    Raises:
+        InputError: viser is not installed.
+    """
+    try:
+        import viser
+    except ImportError:
+        raise InputError("view needs viser: pip install 'hecbench[viewer]'") from None
+    with stdout_to_stderr():  # it greets
+        return viser.ViserServer(host=host, port=port, verbose=False)
