@@ -57,8 +57,8 @@ class Background:
         """From photographs of one fixed camera; of many, from some that are spread evenly."""
         chosen = np.unique(np.linspace(0, len(images) - 1, _MOST_FOR_BACKGROUND).round().astype(int))
         shown = np.empty((len(chosen), *images.shape[1:]), np.uint8)
-        for place, image in zip(shown, images.subset(chosen.tolist()), strict=True):
-            place[:] = image
+        for place, photograph in zip(shown, images.subset(chosen.tolist()), strict=True):
+            place[:] = photograph
         image, agreement = scene_background.background(shown)
         return Background(np.round(image).astype(np.uint8), agreement)
 
