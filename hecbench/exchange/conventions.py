@@ -145,7 +145,7 @@ def prove(
     limit = min(_STILL, _CLEARLY_WORSE * min(c.stillness.relative for c in candidates) + 0.01)
     still = [c for c in candidates if c.stillness.relative <= limit]
     if any(turns_about_one_axis(c.robot.poses) for c in still or documented):
-        return _documented_only(source, documented)
+        return _documented_only(source, documented if settled else [])
     possible = still if settled else [c for c in still if c.sees_target] or still
     least = min((c.deviations for c in possible), default=0)
     fitting = _distinct([c for c in possible if c.deviations == least])
@@ -186,14 +186,14 @@ def _count(stream: Sequence[Reading]) -> int:
 
 def _documented_only(source: str, documented: Sequence[_Candidate]) -> Proof:
     """What is documented, where the motion proves nothing."""
-    if len(documented) == 1:
-        return _proof(
-            documented[0],
-            f"{source}: read as documented, {documented[0].name}; one axis of rotation proves no convention",
+    if not documented:
+        raise InputError(
+            f"{source}: one axis of rotation proves no convention, and none is documented; turn the hand about two "
+            f"axes, or {_CURE}"
         )
-    raise InputError(
-        f"{source}: one axis of rotation proves no convention, and {len(documented)} readings are "
-        f"possible; {_CURE}"
+    name = documented[0].name
+    return _proof(
+        documented[0], f"{source}: read as documented, {name}; one axis of rotation proves no convention"
     )
 
 

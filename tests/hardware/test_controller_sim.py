@@ -143,6 +143,14 @@ def test_custom_script(control, receive):
     assert receive.getDigitalOutState(3)
 
 
+def test_a_custom_script_closes_the_gripper(control, controller):
+    script = "rq_activate_and_wait()\nrq_close_and_wait()\n"
+    assert control.sendCustomScriptFunction("close", script)
+    with socket.create_connection((controller.host, 63352), 20.0) as gripper:
+        gripper.sendall(b"GET POS\n")
+        assert gripper.makefile().readline() == "POS 255\n"
+
+
 def test_outputs_and_slider(receive, controller):
     outputs = rtde_io.RTDEIOInterface(controller.host)
     try:

@@ -8,9 +8,8 @@ from dataclasses import dataclass, field
 
 _ROBOT_MESSAGE = 20
 _SOURCE = 100
-_TEXT, _POPUP, _VERSION, _ERROR, _RUNTIME_EXCEPTION = 0, 2, 3, 6, 10
+_TEXT, _POPUP, _VERSION, _RUNTIME_EXCEPTION = 0, 2, 3, 10
 _REQUEST_BOOLEAN = 1
-_ERROR_LEVEL = 2
 _KEPT = 256
 
 
@@ -51,11 +50,6 @@ class Messages:
     def program_error(self, time_s: float, line: int, column: int, text: str) -> None:
         """The end of a program by a fault of its own."""
         self._add(_message(_RUNTIME_EXCEPTION, time_s, struct.pack(">ii", line, column) + text.encode()))
-
-    def report(self, time_s: float, code: int, text: str) -> None:
-        """An error of the controller, as the pendant's log shows it."""
-        body = struct.pack(">iiiII", code, 0, _ERROR_LEVEL, 0, 0) + text.encode()
-        self._add(_message(_ERROR, time_s, body))
 
     def _add(self, message: bytes) -> None:
         self.count += 1

@@ -103,8 +103,6 @@ class UrRobot:
         sample = self._stream.latest
         return np.asarray(se3.inverse(self.arm.forward(sample.joints)) @ sample.base_T_tcp)
 
-    # reading
-
     def state(self) -> RobotState:
         """The newest state; raises `DeviceFault` when the link is lost or silent."""
         if self._stream.fault and self._stream.link_lost:
@@ -133,8 +131,6 @@ class UrRobot:
             "limits": asdict(self.limits),
         }
 
-    # taking control
-
     @property
     def enabled(self) -> bool:
         """Whether the arm can be moved from here."""
@@ -156,8 +152,6 @@ class UrRobot:
     def _set_slider(self, fraction: float) -> None:
         with Outputs(self.host) as outputs:
             outputs.call("setSpeedSlider", fraction)
-
-    # moving
 
     def move_joints(self, joints_rad: Array, *, speed_rad_s: float | None = None) -> None:
         """Straight in joint space; the path is checked first.
@@ -255,8 +249,6 @@ class UrRobot:
         control = self._ready()[0]
         self._target = None
         return control.freedrive()
-
-    # after a fault, and the end
 
     def recover(self, acknowledge: Callable[[str], bool]) -> bool:
         """Make ready again after a fault, with the operator's word; False when the operator says no.

@@ -28,6 +28,7 @@ from hecbench_plugins.start_search.kernels import moments, shared_pixels
 from hecbench_plugins.start_search.view_sphere import ViewSphere, alike, best_apart, look_at
 from hecbench_plugins.views.pyramid import (
     Level,
+    RaggedMasks,
     View,
     meshes_by_level,
     prepare,
@@ -257,6 +258,8 @@ class GuessFree:
                 ends.append(self.solver(given, rng=rng))
             except SolverFailure as failure:
                 failures.append(failure)
+        if not ends and isinstance(failures[0], RaggedMasks):
+            raise failures[0]
         if not ends:
             raise SolverFailure(f"from the best start of the search, {failures[0]}")
         return ends
