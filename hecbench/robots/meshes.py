@@ -22,7 +22,6 @@ from hecbench import cache
 from hecbench.robots import materials, mesh_files
 from hecbench.robots.materials import referenced_files
 from hecbench.robots.pieces import Piece
-from hecbench.robots.sheets import seen_from_behind
 from hecbench.robots.urdf import Mesh, Primitive, Visual
 from hecbench.robots.urdf_files import find_mesh, find_texture
 
@@ -124,6 +123,8 @@ def _primitive(shape: Primitive) -> Piece:
 
 def _seen_from_both_sides(parts: tuple[Part, ...]) -> tuple[Part, ...]:
     """The parts with the faces marked whose backs are seen, judged over all parts of a link together."""
+    from hecbench.robots.sheets import seen_from_behind
+
     marked = list(parts)
     for link in dict.fromkeys(part.link for part in parts):
         of_link = [i for i, part in enumerate(parts) if part.link == link]
