@@ -28,7 +28,7 @@ _SEEN_RGB, _PREDICTED_RGB = (40, 220, 60), (255, 90, 30)
 
 
 def write(recording: Recording, estimate: Estimate, folder: Path) -> list[Path]:
-    """``verdict_pictures/<sample>.jpg`` of some samples spread over a prepared recording; unreadable images are left out."""
+    """``verdict_pictures/<sample>.jpg`` of samples spread over a prepared recording; unreadable images are skipped."""
     place = folder / FOLDER
     for old in place.glob("*.jpg"):
         old.unlink()
