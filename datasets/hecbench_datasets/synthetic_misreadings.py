@@ -95,7 +95,7 @@ def squares_not_square(recording: Recording, rng: np.random.Generator) -> Record
     grid = corners.reshape(len(corners), target.rows, target.columns, 2)
     stretched = _stretched(grid, float(pitch)).reshape(corners.shape)
     outside = ((stretched < -0.5) | (stretched > [camera.width - 0.5, camera.height - 0.5])).any(-1)
-    return replace(recording, corners_px=np.where(outside[..., None], np.nan, stretched))
+    return replace(recording, corners_px=np.where(np.expand_dims(outside, -1), np.nan, stretched))
 
 
 def _stretched(grid: Array, pitch: float) -> Array:
