@@ -1,6 +1,7 @@
 """Marker methods on generated rigs: accuracy, Cramer-Rao bound, coverage, times, and the recall of `check`.
 
-Run: ``python benchmarks/bench_markers.py accuracy|coverage|times|check [--rigs 200]`` (minutes each, one core).
+Run: ``python benchmarks/bench_markers.py accuracy|coverage|times|check|misreadings [--rigs 200]``
+(minutes each, one core).
 """
 
 import argparse
@@ -15,6 +16,7 @@ import cv2
 import numpy as np
 from hecbench_datasets.synthetic_faults import FAULTS, arm_recording
 from hecbench_datasets.synthetic_markers import PRESETS, generate, make
+from hecbench_datasets.synthetic_misreadings import MISREADINGS, near_board
 from hecbench_plugins.markers.reprojection import corner_problem
 from hecbench_plugins.solvers.bundle import Bundle
 
@@ -159,7 +161,28 @@ def check_recall(rigs):
         print(f"{name:34} {fault.finding:28} {share:6.1f} %  besides: {dict(besides)}", flush=True)
 
 
-CAMPAIGNS = {"accuracy": accuracy, "coverage": coverage, "times": times, "check": check_recall}
+def misreadings(rigs):
+    """How often `check` names the cause of a misread board recording, names another, and is silent on good ones."""
+    sources = [near_board(np.random.default_rng([13, i]), 12 + i % 30, i % 2 == 1) for i in range(rigs)]
+    alarms = Counter(f.id for r in sources for f in check(r) if f.severity is Severity.CRITICAL)
+    print(f"{rigs} good recordings, critical findings: {dict(alarms)}", flush=True)
+    for name, fault in MISREADINGS.items():
+        hits, besides = 0, Counter()
+        for index, source in enumerate(sources):
+            faulty = fault.seed(source, np.random.default_rng([11, index]))
+            ids = {f.id for f in check(faulty) if f.severity is Severity.CRITICAL}
+            hits += fault.finding in ids
+            besides.update(ids - {fault.finding})
+        print(f"{name:34} {fault.finding:22} {hits} of {rigs}  besides: {dict(besides)}", flush=True)
+
+
+CAMPAIGNS = {
+    "accuracy": accuracy,
+    "coverage": coverage,
+    "times": times,
+    "check": check_recall,
+    "misreadings": misreadings,
+}
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)

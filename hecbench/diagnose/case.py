@@ -41,6 +41,7 @@ class Examination:
         size_factor: by which the declared size of the target is multiplied.
         explained: ids of samples whose fault has been named.
         pictures: samples before those of one robot pose were taken together.
+        said: what could not be computed, and why.
         noise_px: rms distance that a corner keeps from its own picture's target pose; None when unknown.
     """
 
@@ -51,6 +52,7 @@ class Examination:
     explained: frozenset[str] = frozenset()
     noise_px: float | None = None
     pictures: int = 0
+    said: tuple[str, ...] = ()
 
     @staticmethod
     def of(recording: Recording, prepared: Recording | None = None) -> Examination:
@@ -64,7 +66,8 @@ class Examination:
         given = recording.camera is not None and recording.camera.K is not None
         fitted = not given and seen.camera is not None and seen.camera.K is not None
         known = replace(recording.without_truth(), corners_px=seen.corners_px, camera=seen.camera)
-        return Examination(known, fitted, pictures=len(known))
+        said = tuple(note for note in seen.notes if note not in recording.notes)
+        return Examination(known, fitted, pictures=len(known), said=said)
 
     @cached_property
     def observed(self) -> Recording:

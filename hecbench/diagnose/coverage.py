@@ -24,6 +24,7 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
         severity = Severity.INFO if len(case.usable) >= FEW_SAMPLES else Severity.WARNING
         if not len(case.usable):
             summary = "no sample has a robot pose and a target pose: there is nothing to examine"
+            summary = "; ".join([summary, *case.said])
             severity = Severity.CRITICAL
         action = "" if severity is Severity.INFO else "record 10 or more samples that show the target"
         return Finding(ID, severity, summary, action, float(len(case.usable)), float(FEW_SAMPLES)), case

@@ -116,3 +116,32 @@ def resolved(joints: tuple[Joint, ...], path: Path, notes: list[str]) -> tuple[J
             notes.append(f"joint '{joint.name}' mimics '{head.name}', which is fixed: it stays at {offset:g}")
         done.append(replace(joint, leader=head.name, multiplier=multiplier, offset=offset))
     return tuple(done)
+
+
+def ordered(joints: list[Joint], links: list[str], path: Path) -> tuple[tuple[Joint, ...], tuple[str, ...]]:
+    """Joints parents first and the links root first; refuses anything that is not one tree."""
+    known = set(links)
+    for joint in joints:
+        for link in (joint.parent, joint.child):
+            if link not in known:
+                raise InputError(
+                    f"{path}: joint '{joint.name}' hangs on no link of the tree: there is no '{link}'"
+                )
+    children = {joint.child for joint in joints}
+    roots = [link for link in links if link not in children]
+    if len(roots) != 1:
+        raise InputError(
+            f"{path}: a robot has one root link, this has {len(roots)}: {', '.join(roots) or 'a loop'}"
+        )
+    below: dict[str, list[Joint]] = {}
+    for joint in joints:
+        below.setdefault(joint.parent, []).append(joint)
+    done: list[Joint] = []
+    waiting = list(below.get(roots[0], ()))
+    while waiting:
+        done.append(waiting.pop(0))
+        waiting += below.get(done[-1].child, ())
+    if len(done) < len(joints):
+        lost = next(joint for joint in joints if joint not in done)
+        raise InputError(f"{path}: joint '{lost.name}' hangs on no link of the tree: it is part of a loop")
+    return tuple(done), (roots[0], *(joint.child for joint in done))

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from hecbench import cache
 from hecbench.robots import materials, mesh_files
 from hecbench.robots.materials import referenced_files
-from hecbench.robots.sheets import seen_from_behind
+from hecbench.robots.pieces import Piece
 from hecbench.robots.urdf import Mesh, Primitive, Visual
 from hecbench.robots.urdf_files import find_mesh, find_texture
 
@@ -109,7 +109,7 @@ def _pieces(
     return parts
 
 
-def _primitive(shape: Primitive) -> mesh_files.Piece:
+def _primitive(shape: Primitive) -> Piece:
     import trimesh
 
     if shape.kind == "box":
@@ -118,13 +118,13 @@ def _primitive(shape: Primitive) -> mesh_files.Piece:
         mesh = trimesh.creation.cylinder(*shape.sizes, sections=64)
     else:
         mesh = trimesh.creation.icosphere(4, *shape.sizes)
-    return mesh_files.Piece(
-        shape.kind, np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int64), None
-    )
+    return Piece(shape.kind, np.asarray(mesh.vertices, float), np.asarray(mesh.faces, np.int64), None)
 
 
 def _seen_from_both_sides(parts: tuple[Part, ...]) -> tuple[Part, ...]:
     """The parts with the faces marked whose backs are seen, judged over all parts of a link together."""
+    from hecbench.robots.sheets import seen_from_behind
+
     marked = list(parts)
     for link in dict.fromkeys(part.link for part in parts):
         of_link = [i for i, part in enumerate(parts) if part.link == link]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from hecbench import files
 from hecbench.errors import InputError
 from hecbench.robots import xml
-from hecbench.robots.joints import Joint, Motion, resolved
+from hecbench.robots.joints import Joint, Motion, ordered, resolved
 
 Array = NDArray[np.float64]
 Colour = tuple[float, float, float]
@@ -106,10 +106,10 @@ def read(path: Path) -> Description:
     reader.refuse_twice("link", links)
     reader.refuse_twice("joint", [joint.name for joint in joints])
     reader.refuse_twice("the child of two joints: link", [joint.child for joint in joints])
-    ordered, order = _ordered(joints, links, path)
-    reader.refuse_bases_above_others(ordered, order[0])
+    tree, order = ordered(joints, links, path)
+    reader.refuse_bases_above_others(tree, order[0])
     visuals = [visual for link in root.findall("link") for visual in reader.visuals(link)]
-    return Description(resolved(ordered, path, reader.notes), order, tuple(visuals), tuple(reader.notes))
+    return Description(resolved(tree, path, reader.notes), order, tuple(visuals), tuple(reader.notes))
 
 
 class _Reader:
@@ -283,32 +283,3 @@ class _Reader:
             return None, named
         red, green, blue, _ = self.numbers(material.find("color"), "rgba", 4, f"{where}: color")
         return (float(red), float(green), float(blue)), named
-
-
-def _ordered(joints: list[Joint], links: list[str], path: Path) -> tuple[tuple[Joint, ...], tuple[str, ...]]:
-    """Joints parents first and the links root first; refuses anything that is not one tree."""
-    known = set(links)
-    for joint in joints:
-        for link in (joint.parent, joint.child):
-            if link not in known:
-                raise InputError(
-                    f"{path}: joint '{joint.name}' hangs on no link of the tree: there is no '{link}'"
-                )
-    children = {joint.child for joint in joints}
-    roots = [link for link in links if link not in children]
-    if len(roots) != 1:
-        raise InputError(
-            f"{path}: a robot has one root link, this has {len(roots)}: {', '.join(roots) or 'a loop'}"
-        )
-    below: dict[str, list[Joint]] = {}
-    for joint in joints:
-        below.setdefault(joint.parent, []).append(joint)
-    ordered: list[Joint] = []
-    waiting = list(below.get(roots[0], ()))
-    while waiting:
-        ordered.append(waiting.pop(0))
-        waiting += below.get(ordered[-1].child, ())
-    if len(ordered) < len(joints):
-        lost = next(joint for joint in joints if joint not in ordered)
-        raise InputError(f"{path}: joint '{lost.name}' hangs on no link of the tree: it is part of a loop")
-    return tuple(ordered), (roots[0], *(joint.child for joint in ordered))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from glob import escape
+from itertools import takewhile
 from pathlib import Path
 
 from hecbench import files
@@ -13,6 +15,9 @@ _PACKAGES = ("package://", "model://")
 _MESHES = (".stl", ".obj", ".dae", ".ply", ".glb", ".gltf")
 _FOLDERS_ABOVE = 4
 """Of the URDF, that are searched: description packages nest it by two or three."""
+_FOLDERS_BELOW = 3
+_LEAST_AGREEING = 2
+"""Names at the end of a path that was found otherwise nowhere: a file's alone does not tell visual from collision."""
 
 
 def find_mesh(filename: str, urdf: Path) -> Path:
@@ -48,7 +53,21 @@ def _found(filename: str, urdf: Path) -> Path | None:
             for place in places:
                 if (place / tail).is_file():
                     return place / tail
-    return None
+    return _below(Path(name.replace("\\", "/")), urdf.parent) if of_package else None
+
+
+def _below(name: Path, folder: Path) -> Path | None:
+    """The file below a folder that agrees with most of a name's end, in its own folder's name at least."""
+    patterns = ("/".join(["*"] * depth + [escape(name.name)]) for depth in range(1, _FOLDERS_BELOW + 1))
+    found = [path for pattern in patterns for path in sorted(folder.glob(pattern)) if path.is_file()]
+    agreeing = [len(_common_end(path.parts, name.parts)) for path in found]
+    best = max(agreeing, default=0)
+    return found[agreeing.index(best)] if best >= _LEAST_AGREEING and agreeing.count(best) == 1 else None
+
+
+def _common_end(one: tuple[str, ...], other: tuple[str, ...]) -> list[str]:
+    pairs = zip(reversed(one), reversed(other), strict=False)
+    return [a for a, _ in takewhile(lambda pair: pair[0] == pair[1], pairs)]
 
 
 def copy(urdf: Path, folder: Path) -> Path:

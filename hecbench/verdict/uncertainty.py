@@ -69,7 +69,9 @@ def uncertainty(estimate: Estimate, samples: int, points_m: Array) -> Uncertaint
     from scipy.stats import f as f_distribution
 
     scatter = _of_folds(estimate)
-    freedom = max(samples - _LEAST_FREEDOM, _LEAST_FREEDOM)
+    freedom = max(
+        6.0 * samples - 12.0, _LEAST_FREEDOM
+    )  # residuals of the robot's poses less the unknowns X and Y
     if estimate.covariance is None:
         return scatter
     own = Uncertainty(np.asarray(estimate.covariance, float), freedom)

@@ -7,6 +7,9 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
+pytestmark = pytest.mark.timeout(
+    1200
+)  # every method on the photographs: half a minute of a core, more on a busy one
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
 
 

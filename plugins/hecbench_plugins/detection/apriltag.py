@@ -11,16 +11,27 @@ from numpy.typing import NDArray
 from hecbench import apriltags
 from hecbench.errors import InputError, TargetNotSeen
 from hecbench.targets import ANY_TAG, AprilTagTarget
-from hecbench_plugins.detection.pictures import each
+from hecbench_plugins.detection.pictures import each, mirrored
 
 Array = NDArray[np.float64]
 Grey = NDArray[np.uint8]
 
 FAMILIES = ("tag36h11", "tag25h9", "tag16h5", "tagCircle21h7", "tagStandard41h12")
 
+_MOSTLY = 0.5
+
 
 def tags(grey: Grey, family: str) -> dict[int, Array]:
-    """Corners (4, 2) px by tag id, OpenCV's pixel centres; of tags seen twice the clearer one.
+    """Corners (4, 2) px by tag id, OpenCV's pixel centres; an id seen twice is no one tag's, and is left out.
+
+    Raises:
+        InputError: the family is unknown.
+    """
+    return {tag_id: found[0] for tag_id, found in sightings(grey, family).items() if len(found) == 1}
+
+
+def sightings(grey: Grey, family: str) -> dict[int, list[Array]]:
+    """The corners (4, 2) px of every tag, by id: several where an id is seen more than once.
 
     Raises:
         InputError: the family is unknown.
@@ -28,20 +39,32 @@ def tags(grey: Grey, family: str) -> dict[int, Array]:
     if family not in FAMILIES:
         raise InputError(f"target.family: '{family}' is not one of {', '.join(FAMILIES)}")
     for decimate in (1.0, 2.0):
-        found = apriltags.detected(grey, family, decimate)
-        if found:
+        if found := apriltags.detected(grey, family, decimate):
             break
-    found.sort(key=lambda tag: tag.margin)
-    return {tag.id: tag.corners_px for tag in found}
+    by_id: dict[int, list[Array]] = {}
+    for tag in sorted(found, key=lambda tag: -tag.margin):
+        others = by_id.setdefault(tag.id, [])
+        if all(_apart(tag.corners_px, other) for other in others):
+            others.append(tag.corners_px)
+    return by_id
+
+
+def _apart(corners_px: Array, other: Array) -> bool:
+    """Whether two quadrilaterals are not the same tag, found twice."""
+    width = np.linalg.norm(other[1] - other[0])
+    return bool(np.linalg.norm(corners_px.mean(0) - other.mean(0)) > width / 2)
 
 
 def find(greys: Sequence[Grey | None], target: AprilTagTarget) -> tuple[AprilTagTarget, list[Array | None]]:
     """The tag's corners in each picture; a target of id `ANY_TAG` becomes the only tag in view.
 
+    A picture that shows the id twice shows no one tag, and counts as one that does not show it.
+
     Raises:
-        TargetNotSeen: the tag is in no picture, or `ANY_TAG` does not single one out; the ids seen are listed.
+        TargetNotSeen: the tag is in no picture or mostly twice, or `ANY_TAG` does not single one out; the ids seen are
+            listed.
     """
-    seen = [found or {} for found in each(greys, tags, target.family)]
+    seen = [found or {} for found in each(greys, sightings, target.family)]
     counts = Counter(tag_id for found in seen for tag_id in found)
     tag_id = target.id
     if tag_id == ANY_TAG and len(counts) == 1:
@@ -49,8 +72,15 @@ def find(greys: Sequence[Grey | None], target: AprilTagTarget) -> tuple[AprilTag
     if tag_id not in counts:
         ids = ", ".join(f"{number} ({count}x)" for number, count in counts.most_common(8)) or "none"
         wanted = "one tag only" if tag_id == ANY_TAG else f"id {tag_id}"
+        cure = "correct it" if counts else f"correct it{mirrored(greys, tags, target.family)}"
         raise TargetNotSeen(
-            f"target.id: expected {wanted} of {target.family} in {len(greys)} images, seen: {ids}; correct it"
+            f"target.id: expected {wanted} of {target.family} in {len(greys)} images, seen: {ids}; {cure}"
+        )
+    twice = sum(len(found.get(tag_id, ())) > 1 for found in seen)
+    if twice > _MOSTLY * counts[tag_id]:
+        raise TargetNotSeen(
+            f"target.id: id {tag_id} of {target.family} is seen twice in {twice} of {counts[tag_id]} images: which of "
+            "the two is the target cannot be told; cover one, or print another id"
         )
     resolved = AprilTagTarget(target.family, tag_id, target.size_m)
-    return resolved, [found.get(tag_id) for found in seen]
+    return resolved, [found[tag_id][0] if len(found.get(tag_id, ())) == 1 else None for found in seen]

@@ -23,6 +23,8 @@ Result = TypeVar("Result")
 
 _KEPT = Cache("detections.sqlite", most_bytes=64 * 2**20)
 _LIBRARIES = ("opencv-contrib-python-headless", "pupil-apriltags")
+_FLIPPED = 5
+"""Pictures that are tried flipped when the target is in none."""
 _ARRAY = 1
 """Code of an array among MessagePack's extension types."""
 
@@ -87,6 +89,15 @@ def _program() -> bytes:
     for name in _LIBRARIES:
         digest.update(repr([found.version for found in metadata.distributions(name=name)]).encode())
     return digest.digest()
+
+
+def mirrored(greys: Sequence[Grey | None], work: Callable[..., Any], *arguments: Any) -> str:
+    """A clause that names the fault when `work` finds its target in a picture flipped left to right; else empty."""
+    flipped = [None if grey is None else np.ascontiguousarray(grey[:, ::-1]) for grey in greys[:_FLIPPED]]
+    count = sum(bool(found is not None and len(found)) for found in each(flipped, work, *arguments))
+    if not count:
+        return ""
+    return f"; the images are mirrored: flipped left to right {count} of {len(flipped)} show it; turn off the mirror"
 
 
 def _packed(value: Any) -> Any:

@@ -22,6 +22,7 @@ from hecbench.rendering.undistort import shrunk_intrinsics
 from hecbench_plugins.maskless import kernels
 from hecbench_plugins.views import scene_background
 from hecbench_plugins.views.canvas import Canvas, Images
+from hecbench_plugins.views.spool import Spool
 
 Array = NDArray[np.float64]
 
@@ -30,6 +31,8 @@ HALF_LINE = 8
 CORRELATED_POINTS = 30.0
 """Neighbouring contour points of an image that say as much as one alone."""
 FEWEST_POINTS = 30
+_MOST_FOR_BACKGROUND = 40
+"""Photographs that the background is taken from: more change it little, and cost memory and the square of the time."""
 _COARSEST_PX = 400
 _BAND_PX = 20
 _LEAST_SIGMA_PX = 0.7
@@ -50,9 +53,13 @@ class Background:
     agreement: NDArray[np.float32]
 
     @staticmethod
-    def of(images: Images) -> Background:
-        """From photographs (N, H, W, 3) of one fixed camera."""
-        image, agreement = scene_background.background(images)
+    def of(images: Spool) -> Background:
+        """From photographs of one fixed camera; of many, from some that are spread evenly."""
+        chosen = np.unique(np.linspace(0, len(images) - 1, _MOST_FOR_BACKGROUND).round().astype(int))
+        shown = np.empty((len(chosen), *images.shape[1:]), np.uint8)
+        for place, photograph in zip(shown, images.subset(chosen.tolist()), strict=True):
+            place[:] = photograph
+        image, agreement = scene_background.background(shown)
         return Background(np.round(image).astype(np.uint8), agreement)
 
 
@@ -143,17 +150,16 @@ class ContourMatcher:
         self.parent_T_link = self.canvas.parent_T_link
         height, width = (size // self.level for size in self.canvas.valid.shape)
 
-        def small(picture: NDArray[np.generic]) -> NDArray[np.generic]:
+        def small(picture: NDArray[Any]) -> NDArray[Any]:
             if self.level == 1:
                 return picture
             return np.asarray(cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA))
 
-        def prepared(image: Images) -> tuple[Images, Images]:
-            shrunk = np.ascontiguousarray(small(image), np.uint8)
-            return shrunk, np.asarray(cv2.GaussianBlur(shrunk, (0, 0), 0.8), np.uint8)
-
-        pairs = threads.each(prepared, self.canvas.images)
-        self._images, self._smooth = [pair[0] for pair in pairs], [pair[1] for pair in pairs]
+        full, count = self.canvas.images, len(self.canvas)
+        self._images = full if self.level == 1 else Spool.of(lambda view: small(full[view]), count)
+        self._smooth = Spool.of(
+            lambda view: np.asarray(cv2.GaussianBlur(self._images[view], (0, 0), 0.8), np.uint8), count
+        )
         whole = np.asarray(small(255 * self.canvas.valid.astype(np.uint8))) > 254
         self._valid = np.asarray(cv2.erode(whole.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0)
         self._background = np.zeros((0, width, 3), np.uint8)

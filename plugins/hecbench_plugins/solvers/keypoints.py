@@ -8,7 +8,7 @@ one on the flange, with a covariance, and with a refusal when too little is seen
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -18,13 +18,16 @@ from hecbench.errors import InputError, Refusal, SolverFailure
 from hecbench.estimate import Estimate, Termination
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
-from hecbench.specs import Need, SolverSpec
+from hecbench.specs import Need, Option, Solver, SolverSpec
 from hecbench_plugins.perception import MODEL_OPTION
 
 if TYPE_CHECKING:
     from hecbench_plugins.perception.keypoint_pose import Sightings
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.uint8]
+
+_ROBOT = 0.5
 
 
 @dataclass(frozen=True)
@@ -33,6 +36,8 @@ class Keypoints:
 
     Attributes:
         model: a perception plugin or the folder of a trained network; None: one that knows the robot.
+        refine: whether the camera is aligned with the network's masks from there, by `render_gn`'s first stages; where
+            these end without an answer, that of the keypoints stays.
         least_trust: of a keypoint's heatmap that must lie at one place.
         limit_px: a keypoint farther than this from where the pose puts it is wrong, in pixels of a 640 px wide picture.
         rounds: of RANSAC.
@@ -43,6 +48,7 @@ class Keypoints:
     """
 
     model: str | None = None
+    refine: bool = False
     least_trust: float = 0.2
     limit_px: float = 20.0
     rounds: int = 1000
@@ -68,7 +74,7 @@ class Keypoints:
         camera = recording.camera
         assert camera is not None
         assert camera.K is not None
-        seen, views = self._sightings(recording)
+        seen, views, masks = self._sightings(recording)
         if len(seen.points) < self.fewest:
             raise Refusal(
                 f"{recording.name}: {len(seen.points)} keypoints are trusted in {views} images, {self.fewest} are"
@@ -91,7 +97,7 @@ class Keypoints:
                 f"the keypoints that agree leave the camera uncertain by {1e3 * deviation:.0f} mm,"
                 f" {1e3 * self.largest_deviation_m:.0f} are allowed: give more views, of other postures"
             )
-        return Estimate(
+        found = Estimate(
             parent_T_camera=answer.parent_T_camera,
             covariance=answer.covariance,
             termination=Termination.CONVERGED,
@@ -104,9 +110,10 @@ class Keypoints:
                 "rms_px": answer.rms * float(camera.K[0, 0]),
             },
         )
+        return _aligned(found, recording, masks, rng) if self.refine else found
 
-    def _sightings(self, recording: Recording) -> tuple[Sightings, int]:
-        """Every trusted keypoint of every image that has joints, and how many such images there are."""
+    def _sightings(self, recording: Recording) -> tuple[Sightings, int, list[Mask | None]]:
+        """Every trusted keypoint of every image that has joints, how many such images there are, and their masks."""
         import cv2
 
         from hecbench.robots.posed import PosedRobot
@@ -122,11 +129,14 @@ class Keypoints:
             raise Refusal(str(error)) from error
         images = recording.images or ()
         rows, views = [], 0
+        masks: list[Mask | None] = [None] * len(recording)
         for sample, poses in zip(posed.samples.tolist(), parent_T_link, strict=True):
             if images[sample] is None:
                 continue
             views += 1
             sight = perceiver.see(recording.image(sample))
+            if self.refine:
+                masks[sample] = np.where(sight.visible() > _ROBOT, np.uint8(255), np.uint8(0))
             sure = np.flatnonzero(sight.trust > self.least_trust)
             points = perceiver.keypoint_positions(robot_of(recording), posed.model.links, poses)[sure]
             pixels = sight.keypoints[sure].reshape(-1, 1, 2)
@@ -140,7 +150,38 @@ class Keypoints:
             raise Refusal(
                 f"{recording.name}: no keypoint is trusted in {views} images that have joints: another robot?"
             )
-        return Sightings._make(np.concatenate(values) for values in zip(*rows, strict=True)), views
+        return Sightings._make(np.concatenate(values) for values in zip(*rows, strict=True)), views, masks
+
+
+def _aligned(
+    found: Estimate, recording: Recording, masks: list[Mask | None], rng: np.random.Generator
+) -> Estimate:
+    """The answer aligned with the masks, or as it was, and in `refined` which of the two."""
+    from hecbench_plugins.perception.choice import robot_of
+    from hecbench_plugins.second_order.render_gn import RenderGN
+
+    robot = recording.robot
+    assert robot is not None
+    if robot.model is not None:
+        robot = replace(robot, model=robot_of(recording))
+    ready = replace(recording, masks=tuple(masks), robot=robot, initial_parent_T_camera=found.parent_T_camera)
+    try:
+        aligned = RenderGN()(ready, rng=rng)
+    except (Refusal, SolverFailure) as reason:
+        return replace(found, diagnostics={**found.diagnostics, "refined": f"no: {reason}"})
+    told = {**aligned.diagnostics, **found.diagnostics, "refined": "by the masks"}
+    return replace(aligned, diagnostics=told)
+
+
+def _yes(text: str) -> bool:
+    if text not in ("yes", "no"):
+        raise ValueError("yes or no")
+    return text == "yes"
+
+
+def keypoints(model: str | None = None, refine: bool = True) -> Solver:
+    """The method as the command line has it."""
+    return Keypoints(model, refine)
 
 
 @hookimpl
@@ -149,8 +190,11 @@ def hecbench_solvers() -> Iterable[SolverSpec]:
     yield SolverSpec(
         name="keypoints",
         summary="a network finds points of the robot, PnP over all views finds the camera; no start, no masks",
-        factory=Keypoints,
+        factory=keypoints,
         needs=frozenset({Need.IMAGES, Need.JOINTS, Need.ROBOT_MODEL, Need.INTRINSICS}),
         reference="after Lee et al. 2020 (DREAM)",
-        options=(MODEL_OPTION,),
+        options=(
+            MODEL_OPTION,
+            Option("refine", _yes, "align with the network's masks from there: yes or no"),
+        ),
     )

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import threads
 from hecbench.errors import InputError, Refusal
 from hecbench.recording import EQUIDISTANT, CameraModel, Recording
 from hecbench.rendering.undistort import shrunk_intrinsics
 from hecbench.robots.posed import PosedRobot
+from hecbench_plugins.views.spool import Spool
 
 Array = NDArray[np.float64]
 Images = NDArray[np.uint8]
@@ -31,7 +31,7 @@ class Canvas:
 
     Attributes:
         K: (3, 3) px, pixel centres at integers.
-        images: (N, H, W, 3) RGB.
+        images: (N, H, W, 3) RGB, read one by one.
         valid: (H, W) where the photographs say something.
         joints_rad: (N, J).
         parent_T_link: (N, L, 4, 4) m.
@@ -40,7 +40,7 @@ class Canvas:
     """
 
     K: Array
-    images: Images
+    images: Spool
     valid: NDArray[np.bool_]
     joints_rad: Array
     parent_T_link: Array
@@ -57,7 +57,7 @@ class Canvas:
             return self
         return Canvas(
             self.K,
-            self.images[chosen],
+            self.images.subset(chosen.tolist()),
             self.valid,
             self.joints_rad[chosen],
             self.parent_T_link[chosen],
@@ -80,15 +80,19 @@ def undistorted_canvas(recording: Recording, robot: PosedRobot) -> Canvas:
     if not rows:
         raise Refusal("no sample with joints has an image")
     maps, K, valid = _lens(camera)
+    shrink = int(np.ceil(valid.shape[1] / _LARGEST_PX))
 
-    def one(row: int) -> Images:
+    def one(number: int) -> Images:
         import cv2
 
-        return np.asarray(cv2.remap(recording.image(row), *maps, cv2.INTER_LINEAR), np.uint8)
+        image = np.asarray(cv2.remap(recording.image(rows[number]), *maps, cv2.INTER_LINEAR), np.uint8)
+        return image if shrink == 1 else _shrunk(image, shrink)
 
-    images = np.stack(threads.each(one, rows))
-    if (shrink := int(np.ceil(images.shape[2] / _LARGEST_PX))) > 1:
-        images, valid = _shrunk(images, valid, shrink)
+    images = Spool.of(one, len(rows))
+    if shrink > 1:
+        height, width = images.shape[1:3]
+        cut = valid[: height * shrink, : width * shrink]
+        valid = np.asarray(cut.reshape(height, shrink, width, shrink).all((1, 3)))
         K = shrunk_intrinsics(K, 1 / shrink)
     at_flange = robot.flange_link == robot.parent_link
     flange = None if at_flange else robot.model.link_index(robot.flange_link)
@@ -117,10 +121,9 @@ def _lens(
     return (across, down), K, valid
 
 
-def _shrunk(images: Images, valid: NDArray[np.bool_], by: int) -> tuple[Images, NDArray[np.bool_]]:
+def _shrunk(image: Images, by: int) -> Images:
     import cv2
 
-    height, width = (size // by // _GRID * _GRID for size in valid.shape)
-    cut = np.s_[: height * by, : width * by]
-    resize = [cv2.resize(image[cut], (width, height), interpolation=cv2.INTER_AREA) for image in images]
-    return np.stack(resize), np.asarray(valid[cut].reshape(height, by, width, by).all((1, 3)))
+    height, width = (size // by // _GRID * _GRID for size in image.shape[:2])
+    cut = image[: height * by, : width * by]
+    return np.asarray(cv2.resize(cut, (width, height), interpolation=cv2.INTER_AREA), np.uint8)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench.errors import InputError
+from hecbench_plugins.views.spool import Spool
 
 Pictures = NDArray[np.uint8]
 Floats = NDArray[np.float32]
@@ -108,7 +109,7 @@ def background(images: Pictures) -> tuple[Floats, Floats]:
     return scene, agree
 
 
-def foreground(images: Pictures, scene: Floats) -> Floats:
+def foreground(images: Pictures | Spool, scene: Floats) -> Floats:
     """How unlike the background each pixel is: D (N, H, W) in [0, 1], 0 = it may be the background.
 
     D = 1 - exp(-(max(d - 6, 0) / 14)^2) of the largest channel difference d, both blurred with a sigma of 1 px so

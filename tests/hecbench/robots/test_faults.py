@@ -354,6 +354,18 @@ def test_a_mesh_is_found_by_the_longest_tail(tmp_path, prefix):
     assert np.ptp(load_robot(path).parts[0].vertices) == pytest.approx(0.2)
 
 
+def test_a_mesh_that_was_moved_within_its_package_is_found_below(tmp_path):
+    for kind, size in (("collision", 0.1), ("visual", 0.2)):
+        (tmp_path / "meshes" / kind).mkdir(parents=True)
+        trimesh.creation.box((size, size, size)).export(tmp_path / "meshes" / kind / "c.stl")
+    path = tmp_path / "r.urdf"
+    path.write_text(shape(mesh("package://pkg/meshes/arm7/visual/c.stl")))
+    assert np.ptp(load_robot(path).parts[0].vertices) == pytest.approx(0.2)
+    path.write_text(shape(mesh("package://pkg/other/c.stl")))
+    with pytest.raises(InputError, match="is not there"):
+        load_robot(path)
+
+
 def test_backs_are_drawn_where_they_are_seen():
     """A sheet and an open cup are seen from behind, closed bodies are not; a body turned inside out is all back."""
     sheet = trimesh.Trimesh([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], [[0, 1, 2], [0, 2, 3]])

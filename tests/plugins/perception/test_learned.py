@@ -14,7 +14,7 @@ from hecbench import registry, se3
 from hecbench.errors import InputError, Refusal, SolverFailure
 from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
 from hecbench.robots.posed import PosedRobot
-from hecbench.specs import Kind, SegmenterSpec, TranslatorSpec
+from hecbench.specs import Kind, SegmenterSpec, SolverSpec, TranslatorSpec
 from hecbench.storage import recording_io
 
 CAMERA = CameraModel(640, 480, np.array([[600.0, 0, 320], [0, 600, 240], [0, 0, 1]]))
@@ -107,6 +107,17 @@ def test_the_covariance_is_that_of_the_errors():
         error = se3.log(se3.inverse(truth) @ se3.inverse(answer.parent_T_camera))
         normalised.append(error @ np.linalg.solve(answer.covariance, error))
     assert 4 < np.median(normalised) < 12  # chi-square of 6: 5.3; 20 clusters make it a little larger
+
+
+def test_the_masks_refine_what_the_keypoints_found(lit):
+    spec = registry.load().get(Kind.SOLVER, "keypoints", SolverSpec)
+    blind = replace(lit.without_truth(), initial_parent_T_camera=None, masks=None)
+    estimate = spec.factory()(blind, rng=np.random.default_rng(0))
+    assert estimate.diagnostics["refined"] == "by the masks"
+    assert se3.translation_error_m(lit.truth_parent_T_camera, estimate.parent_T_camera) < 0.01
+    rough = spec.configured({"refine": "no"}).factory()(blind, rng=np.random.default_rng(0))
+    assert "refined" not in rough.diagnostics
+    assert se3.translation_error_m(lit.truth_parent_T_camera, rough.parent_T_camera) < 0.15
 
 
 def test_a_point_that_stands_still_counts_once():
