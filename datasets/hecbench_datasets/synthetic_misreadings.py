@@ -161,11 +161,12 @@ def frozen_robot(recording: Recording, rng: np.random.Generator) -> Recording:
 
 
 def rows_missed(recording: Recording, rng: np.random.Generator) -> Recording:
-    """From the middle on every image has the robot pose of two rows earlier."""
+    """Two robot poses in the middle were not written: from there on each belongs to the image two rows later."""
     assert recording.base_T_flange is not None
     first = len(recording) // 2 + int(rng.integers(0, 3))
     poses = recording.base_T_flange
-    return replace(recording, base_T_flange=np.concatenate([poses[:first], poses[first - 2 : -2]]))
+    kept = recording.subset(range(len(recording) - 2))
+    return replace(kept, base_T_flange=np.concatenate([poses[:first], poses[first + 2 :]]))
 
 
 def text_order(recording: Recording, rng: np.random.Generator) -> Recording:

@@ -15,6 +15,7 @@ from hecbench.lens import same
 from hecbench.recording import CameraModel, Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Column, EvaluatorSpec, Need, ResultSection
+from hecbench.standstills import standstills
 from hecbench_plugins.markers.target_poses import project, target_poses
 
 Array = NDArray[np.float64]
@@ -45,7 +46,7 @@ def held_out(
     residuals: dict[str, Array] = {}
     answers: list[Array] = []
     failed = 0
-    folds = np.array_split(rng.permutation(usable), min(FOLDS, len(usable)))
+    folds = _folds(recording, usable, rng)
     for fold in folds:
         training = np.setdiff1d(usable, fold)
         fitted = solve(recording.subset(training)) if len(training) else None
@@ -86,6 +87,17 @@ def _seen_by(camera: CameraModel | None, recording: Recording) -> Recording:
         return recording
     other = replace(recording, camera=camera, camera_T_target=None)
     return replace(other, camera_T_target=target_poses(other))
+
+
+def _folds(
+    recording: Recording, usable: NDArray[np.int64], rng: np.random.Generator
+) -> list[NDArray[np.int64]]:
+    """At most five sets of samples; those of one robot pose share its error and stay together."""
+    assert recording.base_T_flange is not None
+    labels = standstills(recording.base_T_flange[usable])
+    groups = [usable[labels == label] for label in np.unique(labels)]
+    parts = np.array_split(rng.permutation(len(groups)), min(FOLDS, len(groups)))
+    return [np.concatenate([groups[i] for i in part]) for part in parts if len(part)]
 
 
 def refit_target(parent_T_camera: Array, recording: Recording) -> Array:
