@@ -3,10 +3,3 @@
 `family` says what the network is taught about a robot, `pictures` draws the examples, `training` fits the network,
 `model` runs it by OpenCV alone.
 """
-
-from hecbench.specs import Option
-
-MODEL_OPTION = Option(
-    "model", str, "a perception plugin or the folder of a trained network; default: one that fits"
-)
-"""Of every plugin that a network serves."""
