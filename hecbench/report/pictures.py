@@ -19,7 +19,8 @@ from hecbench.report.overlay import Overlay
 Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 
-FOLDER = "pictures"
+FOLDER = "verdict_pictures"
+"""A name of ours: older pictures in it are deleted."""
 _COUNT = 8
 _WIDEST_PX = 960
 _QUALITY = 78
@@ -27,7 +28,7 @@ _SEEN_RGB, _PREDICTED_RGB = (40, 220, 60), (255, 90, 30)
 
 
 def write(recording: Recording, estimate: Estimate, folder: Path) -> list[Path]:
-    """``pictures/<sample>.jpg`` of some samples spread over a prepared recording; unreadable images are left out."""
+    """``verdict_pictures/<sample>.jpg`` of samples spread over a prepared recording; unreadable images are skipped."""
     place = folder / FOLDER
     for old in place.glob("*.jpg"):
         old.unlink()

@@ -81,6 +81,7 @@ def test_faulty_solvers_are_caught(solver, caught):
     assert caught in failures(solver)
 
 
+NEED_A_MODEL = ("cut", "cyclegan", "cyclegan_mask", "geomaskgan")
 OTHERS = (Kind.DATASET, Kind.EVALUATOR, Kind.EXPORTER, Kind.SEGMENTER, Kind.TRANSLATOR)
 
 
@@ -90,6 +91,10 @@ OTHERS = (Kind.DATASET, Kind.EVALUATOR, Kind.EXPORTER, Kind.SEGMENTER, Kind.TRAN
     ids=lambda plugin: f"{plugin.kind}-{plugin.name}",
 )
 def test_plugins_of_other_kinds_conform(plugin):
+    if plugin.name in NEED_A_MODEL:
+        pytest.skip(
+            f"{plugin.name} needs a model that the user trains: hecbench conformance '{plugin.name}[model=DIR]'"
+        )
     checks = conformance.check_plugin(plugin.spec)
     assert checks
     assert [f"{check.name}: {check.detail}" for check in checks if not check.passed] == []

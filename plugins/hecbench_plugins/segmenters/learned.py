@@ -12,7 +12,7 @@ from hecbench.errors import Refusal
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import SegmenterSpec
-from hecbench_plugins.perception.option import MODEL_OPTION
+from hecbench_plugins.perception.options import MODEL_OPTION
 
 _ROBOT = 0.5
 

@@ -19,7 +19,7 @@ from hecbench.estimate import Estimate, Termination
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Need, Option, Solver, SolverSpec
-from hecbench_plugins.perception.option import MODEL_OPTION
+from hecbench_plugins.perception.options import MODEL_OPTION
 
 if TYPE_CHECKING:
     from hecbench_plugins.perception.keypoint_pose import Sightings

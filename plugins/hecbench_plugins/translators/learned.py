@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from hecbench.registry import hookimpl
 from hecbench.specs import TranslatorSpec
-from hecbench_plugins.perception.option import MODEL_OPTION
+from hecbench_plugins.perception.options import MODEL_OPTION
 
 Picture = NDArray[np.float32]
 
