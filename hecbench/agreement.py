@@ -31,8 +31,10 @@ def share_in_view(seen: Array, predicted: Array) -> float:
         seen: camera_T_target (N, 4, 4) m.
         predicted: inverse(X) H Y (N, 4, 4) m.
     """
-    sights = seen[:, :3, 3] / np.linalg.norm(seen[:, :3, 3], axis=1)[:, None]
-    expected = predicted[:, :3, 3] / np.maximum(np.linalg.norm(predicted[:, :3, 3], axis=1), 1e-12)[:, None]
+    sights, expected = (
+        poses[:, :3, 3] / np.maximum(np.linalg.norm(poses[:, :3, 3], axis=1), 1e-12)[:, None]
+        for poses in (seen, predicted)
+    )
     return share_left(_angles(sights, expected), _angles(sights, sights.mean(0)))
 
 

@@ -93,7 +93,9 @@ def squares_not_square(recording: Recording, rng: np.random.Generator) -> Record
     assert camera is not None
     pitch = rng.choice([0.97, 0.98, 1.02, 1.03])
     grid = corners.reshape(len(corners), target.rows, target.columns, 2)
-    return replace(recording, corners_px=_stretched(grid, float(pitch)).reshape(corners.shape))
+    stretched = _stretched(grid, float(pitch)).reshape(corners.shape)
+    outside = ((stretched < -0.5) | (stretched > [camera.width - 0.5, camera.height - 0.5])).any(-1)
+    return replace(recording, corners_px=np.where(np.expand_dims(outside, -1), np.nan, stretched))
 
 
 def _stretched(grid: Array, pitch: float) -> Array:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,6 +18,10 @@ ID = "camera_frame"
 def examine(case: Examination) -> tuple[Finding | None, Examination]:
     """Where the targets lie; they are examined as a camera would see them that looks at them."""
     poses, optical_T_camera = case.observed.camera_T_target, case.optical_T_camera
+    if poses is not None and not np.nan_to_num(poses[:, :3, 3]).any():
+        summary = "camera_T_target holds rotations only: its translations are all zero"
+        finding = Finding(ID, Severity.CRITICAL, summary, "write the target's position too, in metres")
+        return finding, replace(case, judged=False)
     if poses is None or np.array_equal(optical_T_camera, np.eye(4)):
         return None, case
     towards = optical_T_camera[2, :3]

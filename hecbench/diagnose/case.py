@@ -209,7 +209,7 @@ def looking_at(positions: Array) -> Array:
     A frame among the positions is left backwards, until they fill the usual angle of view.
     """
     distances = np.linalg.norm(positions, axis=1)
-    if not len(positions) or (positions[:, 2] > _BEFORE * distances).mean() > _MOSTLY:
+    if not positions.any() or (positions[:, 2] > _BEFORE * distances).mean() > _MOSTLY:
         return np.eye(4)
     centre = positions.mean(0)
     forward = centre / max(float(np.linalg.norm(centre)), 1e-12)

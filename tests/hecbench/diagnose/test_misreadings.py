@@ -55,3 +55,17 @@ def test_poses_between_samples(rng):
     np.testing.assert_allclose(found[[1, 3]], poses[[0, 2]], atol=1e-12)
     half = se3.log(se3.inverse(poses[0]) @ found[2])
     np.testing.assert_allclose(2 * half, se3.log(se3.inverse(poses[0]) @ poses[1]), atol=1e-9)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("zero", ["base_T_flange", "camera_T_target"])
+def test_translations_of_zero_warn_nobody(zero, exact_rig):
+    poses = getattr(exact_rig, zero).copy()
+    poses[:, :3, 3] = 0
+    bare = replace(
+        exact_rig, corners_px=None, images=None, joints_rad=None, robot=None, target=None, camera=None
+    )
+    findings = {finding.id: finding for finding in check(replace(bare, **{zero: poses}))}
+    if zero == "camera_T_target":
+        assert "rotations only" in findings["camera_frame"].summary
+    assert any(finding.severity is Severity.CRITICAL for finding in findings.values())
