@@ -81,6 +81,9 @@ def _partly_shifted(case: Examination) -> tuple[Finding, Examination] | None:
     finding = Finding(ID, Severity.CRITICAL, summary, action, float(len(concerned)), 0.0, concerned)
     robot = np.arange(len(moves)) + moves
     paired = np.flatnonzero((robot >= 0) & (robot < len(moves)))
+    paired = paired[
+        np.unique(robot[paired], return_index=True)[1]
+    ]  # images whose own row is missing come second
     return finding, _repaired(case, paired, robot[paired])
 
 
