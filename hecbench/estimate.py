@@ -11,13 +11,12 @@ from typing import Any, Literal
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
-from hecbench import files, se3
+from hecbench import se3
 from hecbench.errors import InputError, InvalidAnswer
 from hecbench.recording import OPENCV, CameraModel, Mounting
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
+from hecbench.system import files
 
 SCHEMA = "hecbench.estimate/1"
 

@@ -21,8 +21,8 @@ from hecbench.recording import Recording
 from hecbench.rendering import Renderer, RenderMesh
 from hecbench.rendering.undistort import shrunk_intrinsics
 from hecbench.robots.posed import PosedRobot
+from hecbench.se3 import Array
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 CONTOUR_NOISE_PX = 1.0

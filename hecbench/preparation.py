@@ -10,11 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from hecbench import registry, threads
+from hecbench import registry
 from hecbench.errors import InputError, Refusal
 from hecbench.recording import ImageSource, Recording
 from hecbench.robots.posed import PosedRobot
 from hecbench.specs import DatasetSpec, Kind, Need, ObserverSpec, SegmenterSpec
+from hecbench.system import threads
 
 _OBSERVED = (Need.CORNERS, Need.TARGET_POSES)
 

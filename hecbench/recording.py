@@ -13,11 +13,12 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from hecbench import pictures, se3
+from hecbench import se3
 from hecbench.errors import InputError, Refusal
+from hecbench.se3 import Array
+from hecbench.system import pictures
 from hecbench.targets import Target
 
-Array = NDArray[np.float64]
 Image = NDArray[np.uint8]
 _Value = TypeVar("_Value", np.uint8, np.bool_)
 ImageSource = Path | Image | None
@@ -74,7 +75,7 @@ class CameraModel:
         height: of the image, px.
         K: (3, 3) px, or None when it is still to be calibrated from the images.
         distortion: (0 | 4 | 5 | 8 | 12 | 14,) coefficients in OpenCV's order; none or k1 to k4 of an equidistant lens.
-        distortion_model: "opencv" or "equidistant" (fisheye); see `hecbench.lens`.
+        distortion_model: "opencv" or "equidistant" (fisheye); see `hecbench.rendering.lens`.
     """
 
     width: int

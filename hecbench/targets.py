@@ -7,11 +7,10 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hecbench.errors import InputError
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 ANY_TAG = -1
 """The AprilTag id that stands for the only tag of its family in view; detection puts the true one there."""

@@ -17,13 +17,14 @@ from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
 from hecbench.registry import hookimpl
+from hecbench.se3 import Array
 from hecbench.specs import DatasetSpec
 from hecbench.targets import PointsTarget
 from hecbench_datasets.reading.arms import BAXTER_END_EFFECTOR_M, BAXTER_LEFT
 from hecbench_datasets.reading.pickles import plain_pickle
 from hecbench_datasets.reading.rigid import rigid_fit
 from hecbench_datasets.reading.robots import NO_START, urdf_beside
-from hecbench_datasets.reading.sources import IMAGE_SUFFIXES, Array, files_in, finite, foreign, item, natural
+from hecbench_datasets.reading.sources import IMAGE_SUFFIXES, files_in, finite, foreign, item, natural
 
 _LABELS = "ground_truth_data"
 _SIZE_PX = (2048, 1536)

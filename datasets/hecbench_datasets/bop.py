@@ -14,14 +14,15 @@ from typing import Any
 
 import numpy as np
 
-from hecbench import pictures, se3
+from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
 from hecbench.registry import hookimpl
+from hecbench.se3 import Array
 from hecbench.specs import DatasetSpec
+from hecbench.system import pictures
 from hecbench_datasets.reading.sources import (
     IMAGE_SUFFIXES,
-    Array,
     files_in,
     finite,
     foreign,

@@ -16,8 +16,9 @@ from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
 from hecbench.registry import hookimpl
+from hecbench.se3 import Array
 from hecbench.specs import DatasetSpec
-from hecbench_datasets.reading.sources import Array, finite, foreign, head, text
+from hecbench_datasets.reading.sources import finite, foreign, head, text
 
 _LINE = re.compile(
     r"^(?P<image>\S+\.(?:png|jpg)) (?P<width>\d+)x(?P<height>\d+):"

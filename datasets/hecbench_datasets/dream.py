@@ -20,12 +20,13 @@ from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
 from hecbench.registry import hookimpl
+from hecbench.se3 import Array
 from hecbench.specs import DatasetSpec
 from hecbench.targets import PointsTarget
 from hecbench_datasets.reading.arms import PANDA, Arm
 from hecbench_datasets.reading.rigid import rigid_fit
 from hecbench_datasets.reading.robots import NO_START, urdf_beside
-from hecbench_datasets.reading.sources import Array, finite, foreign, head, item, json_value, natural
+from hecbench_datasets.reading.sources import finite, foreign, head, item, json_value, natural
 
 _SETTINGS = "_camera_settings.json"
 _FARTHEST_M = 10.0

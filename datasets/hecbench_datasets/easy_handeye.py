@@ -18,19 +18,11 @@ from hecbench.errors import InputError
 from hecbench.exchange.conventions import HINTS_NAME
 from hecbench.recording import Mounting, Recording, RobotDescription
 from hecbench.registry import hookimpl
+from hecbench.se3 import Array
 from hecbench.specs import DatasetSpec
 from hecbench_datasets.reading.hints import hints_for
 from hecbench_datasets.reading.pairing import Documented, paired
-from hecbench_datasets.reading.sources import (
-    YAML_SUFFIXES,
-    Array,
-    files_in,
-    finite,
-    foreign,
-    head,
-    item,
-    yaml_value,
-)
+from hecbench_datasets.reading.sources import YAML_SUFFIXES, files_in, finite, foreign, head, item, yaml_value
 
 _SUFFIXES = (*YAML_SUFFIXES, ".samples", ".calib")
 _TRACKING = ("tracking", "optical", "opt")

@@ -11,11 +11,12 @@ from pathlib import Path, PurePosixPath
 
 import numpy as np
 
-from hecbench import files, pictures, se3
+from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel, Image, ImageSource, Mounting, Recording, RobotDescription
 from hecbench.registry import hookimpl
 from hecbench.specs import DatasetSpec
+from hecbench.system import files, pictures
 from hecbench_datasets.reading.arms import PANDA
 from hecbench_datasets.reading.robots import NO_START, urdf_beside
 from hecbench_datasets.reading.sources import (

@@ -10,12 +10,13 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from hecbench import files, se3
+from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.estimate import Estimate, Status
 from hecbench.running import runner
 from hecbench.running.solving import Options
 from hecbench.storage import recording_io
+from hecbench.system import files
 from hecbench_datasets import lerobot
 from hecbench_datasets.reading.lerobot_files import description
 

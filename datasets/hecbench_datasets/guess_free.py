@@ -24,15 +24,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
 from hecbench.registry import hookimpl
+from hecbench.se3 import Array
 from hecbench.specs import SuiteSpec
 from hecbench_datasets.synthetic import BASE, FLANGE, FOCAL_PX, HEIGHT, ROBOT, WIDTH, robot_and_mesh
-
-Array = NDArray[np.float64]
 
 LEVELS = {"free": 1, "free_3": 3, "free_5": 5}
 """Views by level."""

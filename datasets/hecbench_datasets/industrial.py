@@ -12,14 +12,16 @@ from typing import Any
 
 import numpy as np
 
-from hecbench import pictures, se3
+from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
 from hecbench.registry import hookimpl
+from hecbench.se3 import Array
 from hecbench.specs import DatasetSpec
+from hecbench.system import pictures
 from hecbench.targets import Target
 from hecbench_datasets.reading.hints import circle_grid, hinted_target, hints_for
-from hecbench_datasets.reading.sources import Array, finite, foreign, head, item, yaml_value
+from hecbench_datasets.reading.sources import finite, foreign, head, item, yaml_value
 
 _NAMES = ("cal_data.yaml", "data.yaml")
 _QUATERNION = ("x", "y", "z", "qx", "qy", "qz", "qw")

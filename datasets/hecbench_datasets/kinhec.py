@@ -17,8 +17,9 @@ from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.recording import Mounting, Recording, RobotDescription
 from hecbench.registry import hookimpl
+from hecbench.se3 import Array
 from hecbench.specs import DatasetSpec
-from hecbench_datasets.reading.sources import Array, foreign
+from hecbench_datasets.reading.sources import foreign
 from hecbench_datasets.reading.streams import interpolate
 
 INDEX = "sequences.parquet"

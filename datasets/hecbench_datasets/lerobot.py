@@ -17,11 +17,12 @@ from hecbench.errors import InputError
 from hecbench.exchange.conventions import HINTS_NAME
 from hecbench.recording import CameraModel, Mounting, Recording
 from hecbench.registry import hookimpl
+from hecbench.se3 import Array
 from hecbench.specs import DatasetSpec
 from hecbench_datasets.reading.hints import Hints, hinted_target, hints_for
 from hecbench_datasets.reading.joint_poses import joint_readings
 from hecbench_datasets.reading.lerobot_files import Episode, cameras, description, episode, is_dataset
-from hecbench_datasets.reading.sources import Array, foreign
+from hecbench_datasets.reading.sources import foreign
 
 FRAMES = 10
 """Views of an episode: the markerless methods gain little from more."""

@@ -13,18 +13,11 @@ from pathlib import Path
 from hecbench.errors import InputError
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
+from hecbench.se3 import Array
 from hecbench.specs import DatasetSpec
 from hecbench_datasets.reading.hints import hints_for
 from hecbench_datasets.reading.pairing import Documented, paired
-from hecbench_datasets.reading.sources import (
-    YAML_SUFFIXES,
-    Array,
-    files_in,
-    finite,
-    foreign,
-    head,
-    yaml_value,
-)
+from hecbench_datasets.reading.sources import YAML_SUFFIXES, files_in, finite, foreign, head, yaml_value
 
 _ROBOT = re.compile(r"T1|robot|gripper|flange|hand|tool|ee\b|base", re.IGNORECASE)
 _TARGET = re.compile(r"T2|target|cam|marker|board|tag|eye", re.IGNORECASE)

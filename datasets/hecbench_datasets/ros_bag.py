@@ -17,20 +17,22 @@ from typing import Any
 
 import numpy as np
 
-from hecbench import files, se3
+from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.exchange.conventions import HINTS_NAME
 from hecbench.exchange.pose_numbers import Reading
 from hecbench.recording import CameraModel, Mounting, Recording
 from hecbench.registry import hookimpl
+from hecbench.se3 import Array
 from hecbench.specs import DatasetSpec
 from hecbench.storage.recording_io import encode_png
+from hecbench.system import files
 from hecbench_datasets.reading import bags
 from hecbench_datasets.reading.hints import Hints, hinted_target, hints_for
 from hecbench_datasets.reading.joint_poses import BASES, FLANGES, joint_readings
 from hecbench_datasets.reading.pictured_proof import Way, settled
 from hecbench_datasets.reading.seen_targets import seen_target
-from hecbench_datasets.reading.sources import Array, foreign
+from hecbench_datasets.reading.sources import foreign
 from hecbench_datasets.reading.stills import offset_by_change_s, still_moments
 from hecbench_datasets.reading.transforms import Transforms
 

@@ -31,12 +31,12 @@ from hecbench import se3
 from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
 from hecbench.registry import hookimpl
 from hecbench.robots.model import RobotModel, load_robot
+from hecbench.se3 import Array
 from hecbench.specs import SuiteSpec
 
 if TYPE_CHECKING:
     from hecbench.rendering import RenderMesh
 
-Array = NDArray[np.float64]
 Picture = NDArray[np.float32]
 
 ROBOT, BASE, FLANGE = "ur5e", "base_link", "tool0"

@@ -9,14 +9,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
 from hecbench.robots.model import RobotModel
+from hecbench.se3 import Array
 from hecbench.targets import AprilTagTarget, ChessboardTarget, Target
-
-Array = NDArray[np.float64]
 
 _TARGET = AprilTagTarget("tag36h11", 0, 0.12)
 _HOME_RAD = np.deg2rad([0.0, -90.0, 90.0, -90.0, -90.0, 0.0])

@@ -29,15 +29,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.recording import CameraModel, Mounting, Recording
 from hecbench.registry import hookimpl
+from hecbench.se3 import Array
 from hecbench.specs import SuiteSpec
 from hecbench.targets import AprilTagTarget, ChessboardTarget, Target
-
-Array = NDArray[np.float64]
 
 WORKSPACE_CENTRE_M = np.array([0.5, 0.0, 0.3])
 

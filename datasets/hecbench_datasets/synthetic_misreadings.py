@@ -10,16 +10,14 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
-from hecbench.lens import distort
 from hecbench.recording import EQUIDISTANT, OPENCV, CameraModel, Mounting, Recording
+from hecbench.rendering.lens import distort
+from hecbench.se3 import Array
 from hecbench.targets import ChessboardTarget
 from hecbench_datasets.synthetic_faults import Fault
 from hecbench_datasets.synthetic_markers import MarkerSetting, generate
-
-Array = NDArray[np.float64]
 
 NEAR_BOARD = MarkerSetting(
     ChessboardTarget(9, 6, 0.025),

@@ -18,19 +18,11 @@ from hecbench.errors import InputError
 from hecbench.exchange.conventions import HINTS_NAME
 from hecbench.recording import Mounting, Recording
 from hecbench.registry import hookimpl
+from hecbench.se3 import Array
 from hecbench.specs import DatasetSpec
 from hecbench_datasets.reading.hints import Hints, hints_for
 from hecbench_datasets.reading.pairing import Documented, paired
-from hecbench_datasets.reading.sources import (
-    Array,
-    files_in,
-    foreign,
-    head,
-    table,
-    text,
-    zip_bytes,
-    zip_names,
-)
+from hecbench_datasets.reading.sources import files_in, foreign, head, table, text, zip_bytes, zip_names
 from hecbench_datasets.reading.streams import clock_units, in_seconds, interpolate, lag_s, time_offset_s
 
 MOST_SAMPLES = 160

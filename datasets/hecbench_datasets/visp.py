@@ -16,13 +16,13 @@ from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel, Mounting, Recording, RobotDescription
 from hecbench.registry import hookimpl
+from hecbench.se3 import Array
 from hecbench.specs import DatasetSpec
 from hecbench.targets import ANY_TAG, AprilTagTarget, ChessboardTarget, Target
 from hecbench_datasets.reading.hints import hinted_target, hints_for
 from hecbench_datasets.reading.sources import (
     IMAGE_SUFFIXES,
     YAML_SUFFIXES,
-    Array,
     files_in,
     finite,
     foreign,

@@ -18,13 +18,13 @@ from hecbench.exchange.conventions import HINTS_NAME
 from hecbench.exchange.pose_numbers import readings
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
+from hecbench.se3 import Array
 from hecbench.specs import DatasetSpec
 from hecbench_datasets.reading.hints import hinted_target, hints_for
 from hecbench_datasets.reading.pairing import Documented, paired
 from hecbench_datasets.reading.sources import (
     IMAGE_SUFFIXES,
     YAML_SUFFIXES,
-    Array,
     files_in,
     finite,
     foreign,

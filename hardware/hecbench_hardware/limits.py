@@ -11,8 +11,8 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from hecbench import files
 from hecbench.errors import InputError
+from hecbench.system import files
 
 Vector = tuple[float, float, float]
 Joints = tuple[float, float, float, float, float, float]

@@ -10,13 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench.bundle.model import Linearisation, Noise, Problem, State, linearise
 from hecbench.errors import SolverFailure
 from hecbench.estimate import Termination
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 _CONVERGED_COST, _CONVERGED_STEP = 1e-12, 1e-11
 _LARGEST_DAMPING = 1e12

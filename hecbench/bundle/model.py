@@ -23,8 +23,7 @@ from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.recording import Mounting
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 Sensor = Callable[[Array, Array], tuple[Array, Array, Array]]
 """From points (M, 3) m in the camera frame and its parameters (K,): what is observed of them (M, D), and the

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.bundle.model import Sensor
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 _ITERATIONS = 30
 _CONVERGED = 1e-10

@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from hecbench import cache
-from hecbench import threads as most_threads
+from hecbench.system import cache
+from hecbench.system import threads as most_threads
 
 if TYPE_CHECKING:
     from hecbench.running.solving import Options

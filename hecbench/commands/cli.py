@@ -206,8 +206,9 @@ def check(recording: Path, as_json: bool) -> None:
 @click.option("--out", type=choices.FOLDER, help="Folder of the pictures; default: out/render/<recording>.")
 def render(recording: Path, answer: Path, out: Path | None) -> None:
     """Draw the robot over the images of a RECORDING where an estimate places it."""
-    from hecbench import estimate, files, preparation
+    from hecbench import estimate, preparation
     from hecbench.report import overlay
+    from hecbench.system import files
 
     loaded = preparation.load_recording(recording)
     written = overlay.render(
@@ -258,9 +259,10 @@ def import_recording(source: Path, destination: Path, format_name: str | None, u
 @click.option("--marker", help="Name of the target's frame, where a format names it.")
 def export(estimate: Path, format_name: str, out: Path | None, **options: str | None) -> None:
     """Write an ESTIMATE in another program's format: a file, or the recommended one of a folder of results."""
-    from hecbench import files, registry
+    from hecbench import registry
     from hecbench.report import recommended
     from hecbench.specs import ExporterSpec, Kind
+    from hecbench.system import files
 
     exporter = registry.load().get(Kind.EXPORTER, format_name, ExporterSpec)
     given = {name: value for name, value in options.items() if value is not None}

@@ -35,7 +35,7 @@ include = ["{module}.py"]
 )
 def new(kind: str, name: str, out: Path | None) -> None:
     """Write the package of a plugin NAME: one module that works, to be changed into yours."""
-    from hecbench import files
+    from hecbench.system import files
 
     if not re.fullmatch(r"[a-z][a-z0-9_]*", name):
         raise InputError(f"{name}: give a name of lower-case letters, digits and _, as my_{kind}")

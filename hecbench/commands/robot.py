@@ -98,10 +98,11 @@ def _draw(model: RobotModel, positions: NDArray[np.float64], path: Path) -> None
     """The robot from its front, left and above, lit from the camera."""
     import numpy as np
 
-    from hecbench import files, se3
+    from hecbench import se3
     from hecbench.rendering import Renderer, RenderMesh
     from hecbench.robots.extent import placed
     from hecbench.storage.recording_io import encode_png
+    from hecbench.system import files
 
     mesh = RenderMesh.of(model)
     points = placed(model, positions)

@@ -13,16 +13,14 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.errors import Refusal, SolverFailure
 from hecbench.estimate import Estimate
 from hecbench.recording import CameraModel, Mounting, Recording
+from hecbench.se3 import Array
 from hecbench.specs import Need, Solver
 from hecbench.targets import ChessboardTarget
-
-Array = NDArray[np.float64]
 
 TOLERANCE = 1e-6
 """Metres and radians on exact data."""

@@ -19,8 +19,7 @@ from hecbench.bundle.model import Noise, Problem, State, linearise
 from hecbench.diagnose.fit import EXPLAINS, TYPICAL_NOISE, Fit, IdealCamera, hand_poses
 from hecbench.errors import SolverFailure
 from hecbench.recording import Mounting
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 _ASSUMED_FOCAL_PX = 1000.0
 _ASSUMED_HALF_WIDTH = 0.05

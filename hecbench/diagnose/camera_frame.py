@@ -5,12 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity
-
-Array = NDArray[np.float64]
 
 ID = "camera_frame"
 

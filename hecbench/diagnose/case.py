@@ -16,8 +16,7 @@ from hecbench.errors import HecbenchError, SolverFailure
 from hecbench.preparation import prepare
 from hecbench.recording import Mounting, Recording
 from hecbench.robots.posed import PosedRobot
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 STANDS_OUT = 5.0
 """Variance ratio (6 and 6 N - 19 degrees of freedom) that a sample of ten exceeds once in 1500 times."""

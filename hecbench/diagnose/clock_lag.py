@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity
 from hecbench.diagnose.fit import EXPLAINS, LEAST_SAMPLES
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 ID = "clock_lag"
 _LEAST = 12

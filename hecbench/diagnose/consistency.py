@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from hecbench.agreement import LARGEST_SHARE, percent
 from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity
+from hecbench.samples.agreement import LARGEST_SHARE, percent
 
 ID = "consistency"
 

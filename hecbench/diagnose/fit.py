@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
-from hecbench.agreement import share_left
 from hecbench.bundle.adjustment import Solution, adjust
 from hecbench.bundle.model import Noise, Problem, State, predict
 from hecbench.recording import Mounting
-
-Array = NDArray[np.float64]
+from hecbench.samples.agreement import share_left
+from hecbench.se3 import Array
 
 TYPICAL_NOISE = Noise(0.5, float(np.deg2rad(0.1)), 1e-3)
 """Of a corner of a good target and of a good arm: px, rad, m."""

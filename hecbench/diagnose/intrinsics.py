@@ -8,13 +8,13 @@ from pathlib import Path
 
 import numpy as np
 
-from hecbench import pictures
 from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity
 from hecbench.diagnose.fit import EXPLAINS, Fit
 from hecbench.diagnose.resolution import BY_SIZE, OFF_CENTRE, off_centre, rescaled, scaled
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel, Recording
+from hecbench.system import pictures
 
 ID = "intrinsics"
 _HALF = 0.5

@@ -11,8 +11,7 @@ from hecbench import se3
 from hecbench.diagnose.calibrate import spread
 from hecbench.diagnose.case import Examination, inverted
 from hecbench.diagnose.finding import Finding, Severity
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 ID = "joints_vs_pose"
 LIMIT_MM = 3.0

@@ -15,8 +15,7 @@ from hecbench.diagnose.finding import Finding, Severity
 from hecbench.diagnose.fit import hand_poses
 from hecbench.diagnose.precision import Precision, information_of, precision
 from hecbench.recording import CameraModel
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 ID = "next_pose"
 _TILT_DEG = 35.0

@@ -7,13 +7,11 @@ pose has its normal mirrored at the line of sight.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity, names
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 ID = "planar_ambiguity"
 LEAST_DEG = 8.0

@@ -6,15 +6,13 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench.bundle.model import Problem, State, linearise
 from hecbench.diagnose.case import Examination
 from hecbench.diagnose.fit import TYPICAL_NOISE
 from hecbench.recording import Mounting
+from hecbench.se3 import Array
 from hecbench.workspace import points_in_parent, squared_displacement
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

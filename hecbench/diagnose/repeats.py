@@ -13,9 +13,9 @@ from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity, names
 from hecbench.diagnose.fit import LEAST_SAMPLES
 from hecbench.recording import Recording
-from hecbench.standstills import one_per_robot_pose
+from hecbench.samples.standstills import one_per_robot_pose
+from hecbench.se3 import Array
 
-Array = NDArray[np.float64]
 Samples = NDArray[np.bool_]
 
 ID = "repeated_samples"

@@ -8,15 +8,13 @@ from functools import partial
 from itertools import permutations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.diagnose.calibrate import spread
 from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity
 from hecbench.diagnose.fit import EXPLAINS, MUCH_BETTER
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 ID = "rotation_convention"
 MIRRORED_ID = "mirrored_images"

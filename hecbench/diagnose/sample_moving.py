@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity, names
 from hecbench.diagnose.joints_vs_pose import agreement
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 ID = "sample_moving"
 LIMIT_MM = 2.0

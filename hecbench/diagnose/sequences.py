@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from hecbench.diagnose.case import Examination
 from hecbench.diagnose.fit import EXPLAINS, LEAST_SAMPLES, Fit
+from hecbench.se3 import Array
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 FARTHEST = 3

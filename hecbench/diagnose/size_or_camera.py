@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench.bundle.adjustment import Solution, adjust
 from hecbench.bundle.model import Noise, Problem, start
@@ -17,9 +16,8 @@ from hecbench.diagnose.calibrate import spread
 from hecbench.diagnose.case import Examination
 from hecbench.diagnose.fit import TYPICAL_NOISE
 from hecbench.errors import SolverFailure
-from hecbench.lens import Sensor, parameters_of
-
-Array = NDArray[np.float64]
+from hecbench.rendering.lens import Sensor, parameters_of
+from hecbench.se3 import Array
 
 GIVEN, SIZE, FOCAL, CENTRE, BOTH = (
     "given",

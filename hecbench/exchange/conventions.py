@@ -12,7 +12,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.errors import InputError
@@ -25,8 +24,7 @@ from hecbench.exchange.stillness import (
     turns_about_one_axis,
 )
 from hecbench.recording import Mounting
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 HINTS_NAME = "hecbench-import.yaml"
 """The file beside other people's data that says what they do not (docs/adapters.md)."""

@@ -13,14 +13,12 @@ from dataclasses import dataclass
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.estimate import Estimate, Status, plain
 from hecbench.recording import EQUIDISTANT, CameraModel, Mounting
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 OPTIONS = {
     "parent": "name of the parent frame; default: the estimate's parent_link",

@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 _MOST_FITTED = 40
 _SECOND_AXIS_RAD = np.deg2rad(2.0)

@@ -13,10 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
-from hecbench.cache import Cache
 from hecbench.errors import InputError
 from hecbench.robots.meshes import Part
 from hecbench.robots.model import RobotModel
+from hecbench.system.cache import Cache
 
 Float = NDArray[np.float32]
 Int = NDArray[np.int32]

@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench.errors import InputError
-from hecbench.lens import distort
 from hecbench.recording import CameraModel
-
-Array = NDArray[np.float64]
+from hecbench.rendering.lens import distort
+from hecbench.se3 import Array
 
 
 @dataclass(frozen=True, eq=False)

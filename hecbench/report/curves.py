@@ -6,14 +6,12 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.estimate import Estimate
 from hecbench.report.scores import base_name, by_solver, end, ends_mm, known_ends, start_mm
 from hecbench.report.svg import COLOURS, legend_beside, panel, svg
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 _POINTS = 60
 _BASINS_IN_A_ROW = 5

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from hecbench import __version__, files, verdict
+from hecbench import __version__, verdict
 from hecbench.errors import InputError
 from hecbench.estimate import Estimate, best_first
 from hecbench.report import pictures
@@ -23,6 +23,7 @@ from hecbench.storage import evidence, results, store, trial_record
 from hecbench.storage.evidence import Evidence
 from hecbench.storage.results import VERDICT_NAME
 from hecbench.storage.trial_record import TrialRecord
+from hecbench.system import files
 from hecbench.verdict import Verdict
 
 FILE_NAME = "report.html"

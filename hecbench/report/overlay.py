@@ -9,15 +9,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import files, se3
+from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.estimate import Estimate
 from hecbench.recording import Recording
 from hecbench.rendering import Renderer, RenderMesh
 from hecbench.rendering.undistort import Undistortion
 from hecbench.robots.posed import PosedRobot
+from hecbench.se3 import Array
+from hecbench.system import files
 
-Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 
 _CONTOUR_RGB = np.array([1.0, 0.2, 0.1])

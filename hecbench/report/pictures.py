@@ -9,14 +9,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import files, lens, se3
+from hecbench import se3
 from hecbench.errors import HecbenchError, InputError
 from hecbench.estimate import Estimate
 from hecbench.recording import Recording
+from hecbench.rendering import lens
 from hecbench.rendering.undistort import Undistortion
 from hecbench.report.overlay import Overlay
+from hecbench.se3 import Array
+from hecbench.system import files
 
-Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 
 FOLDER = "verdict_pictures"

@@ -8,20 +8,18 @@ from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.estimate import Estimate
-from hecbench.lens import project
 from hecbench.recording import Mounting
+from hecbench.rendering.lens import project
 from hecbench.report.svg import DARK, LIGHT, RED, panel, svg
+from hecbench.se3 import Array
 from hecbench.storage.evidence import Evidence
 from hecbench.workspace import apart_m, points_in_parent
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-
-Array = NDArray[np.float64]
 
 
 def residuals_px(evidence: Evidence, estimate: Estimate) -> Array | None:

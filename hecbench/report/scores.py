@@ -6,15 +6,14 @@ from collections.abc import Callable, Iterable, Sequence
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hecbench import se3, statistics
 from hecbench.estimate import Estimate, Status, Termination
 from hecbench.report import paper
 from hecbench.report.cells import NO_ANSWER, interval, number
+from hecbench.se3 import Array
 from hecbench.statistics import Interval
-
-Array = NDArray[np.float64]
 
 ERROR = "camera_T_parent_translation_error_mm"
 """Translation of camera_T_base, the unknown of the paper's Table I."""

@@ -14,12 +14,13 @@ from pathlib import Path
 
 import numpy as np
 
-from hecbench import files, statistics
+from hecbench import statistics
 from hecbench.report.cells import ABSENT
 from hecbench.report.section import Section
 from hecbench.report.svg import COLOURS, panel, svg
 from hecbench.report.tables import Table
 from hecbench.storage.trial_record import TASKS, Outcome, TrialRecord, picture_name
+from hecbench.system import files
 
 PAPER_PCT = {
     "ur5e": {

@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import files, se3
+from hecbench import se3
 from hecbench.errors import HecbenchError, InputError
 from hecbench.estimate import Estimate
 from hecbench.recording import Mounting, Recording
 from hecbench.robots.posed import PosedRobot
 from hecbench.running.isolation import stdout_to_stderr
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
+from hecbench.system import files
 
 _BOLD_RGB, _RIVAL_RGB, _TARGET_RGB = (20, 120, 60), (150, 160, 175), (255, 120, 30)
 _FRUSTUM_M = 0.12

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.robots.model import RobotModel
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 _WIDER = 20.0
 """A part wider than its robot's reach by this factor is in another unit: millimetres are a thousand."""

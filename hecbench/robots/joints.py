@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench.errors import InputError
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 _HAIR = 0.005
 """Of a joint's range: encoders and rounded limits stray by less; a wrong unit or order by far more."""

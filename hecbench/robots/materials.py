@@ -12,9 +12,9 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import files, pictures
 from hecbench.errors import InputError
 from hecbench.robots import xml
+from hecbench.system import files, pictures
 
 Colour = tuple[float, float, float]
 _LFS = b"version https://git-lfs"

@@ -18,12 +18,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import cache
 from hecbench.robots import materials, mesh_files
 from hecbench.robots.materials import referenced_files
 from hecbench.robots.pieces import Piece
 from hecbench.robots.urdf import Mesh, Primitive, Visual
 from hecbench.robots.urdf_files import find_mesh, find_texture
+from hecbench.system import cache
 
 _CACHE_VERSION = 5
 _GREY = (0.7, 0.7, 0.7)

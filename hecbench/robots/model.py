@@ -15,15 +15,14 @@ from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.robots import packages, urdf
 from hecbench.robots.joints import Joint, Motion
 from hecbench.robots.meshes import Part, visual_parts
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 KNOWN_ARMS = ("ur3e", "ur5e")
 GRIPPER = "robotiq_2f_85"

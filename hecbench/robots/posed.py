@@ -13,8 +13,7 @@ from hecbench import se3
 from hecbench.errors import InputError, Refusal
 from hecbench.recording import Recording
 from hecbench.robots.model import RobotModel, load_robot
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 _FARTHEST_M = 50.0
 """Of the robot from a camera that calibrates it; the starts beyond are in millimetres."""

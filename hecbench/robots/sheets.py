@@ -12,7 +12,7 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 _jit = numba.njit(cache=True, nogil=True)
 

@@ -9,14 +9,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hecbench import files
 from hecbench.errors import InputError
 from hecbench.robots import xml
 from hecbench.robots.joints import Joint, Motion, ordered, resolved
+from hecbench.se3 import Array
+from hecbench.system import files
 
-Array = NDArray[np.float64]
 Colour = tuple[float, float, float]
 
 _MOTIONS = {

@@ -6,10 +6,10 @@ from glob import escape
 from itertools import takewhile
 from pathlib import Path
 
-from hecbench import files
 from hecbench.errors import InputError
 from hecbench.robots import urdf as urdf_reader
 from hecbench.robots.materials import referenced_files
+from hecbench.system import files
 
 _PACKAGES = ("package://", "model://")
 _MESHES = (".stl", ".obj", ".dae", ".ply", ".glb", ".gltf")

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import diagnose, files, preparation, registry, verdict
+from hecbench import diagnose, preparation, registry, verdict
 from hecbench.diagnose import Finding
 from hecbench.estimate import Estimate
 from hecbench.recording import Recording
@@ -19,6 +19,7 @@ from hecbench.specs import ExporterSpec, Kind, SolverSpec
 from hecbench.storage import evidence
 from hecbench.storage.evidence import Evidence
 from hecbench.storage.results import VERDICT_NAME
+from hecbench.system import files
 from hecbench.verdict import Verdict
 from hecbench.verdict.answers import evidence_of
 

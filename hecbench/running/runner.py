@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from hecbench import diagnose, registry, threads
+from hecbench import diagnose, registry
 from hecbench.estimate import Estimate, Status, Termination
 from hecbench.preparation import load_recording, prepare, segmented
 from hecbench.recording import Recording
@@ -17,6 +17,7 @@ from hecbench.running.solving import Options, each_solved, provenance
 from hecbench.specs import Kind, SolverSpec, SuiteSpec
 from hecbench.storage import evidence, store
 from hecbench.storage.evidence import Evidence
+from hecbench.system import threads
 
 
 @dataclass(frozen=True)

@@ -6,13 +6,12 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
-from hecbench import estimate, files, se3
+from hecbench import estimate, se3
 from hecbench.errors import InputError
 from hecbench.recording import Mounting, Recording
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
+from hecbench.system import files
 
 FORMS = (
     "give a file (an estimate, or JSON of a 4x4 matrix), 'X Y Z ROLL PITCH YAW' (m, rad; end with deg for degrees),"

@@ -14,13 +14,11 @@ from typing import Any
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
-from hecbench import files
 from hecbench.errors import InputError
 from hecbench.recording import OPENCV, CameraModel, Mounting, Recording
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
+from hecbench.system import files
 
 FOLDER = "evidence"
 _PICTURES = 3

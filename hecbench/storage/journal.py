@@ -13,8 +13,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Generic, TypeVar
 
-from hecbench import files
 from hecbench.errors import HecbenchError, InputError
+from hecbench.system import files
 
 T = TypeVar("T")
 

@@ -12,11 +12,11 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import files, pictures
 from hecbench.errors import InputError
 from hecbench.estimate import plain
 from hecbench.recording import OPENCV, CameraModel, ImageSource, Mounting, Recording, RobotDescription
 from hecbench.robots import urdf_files
+from hecbench.system import files, pictures
 from hecbench.targets import AprilTagTarget, CharucoTarget, ChessboardTarget, PointsTarget, Target
 
 SCHEMA = "hecbench.recording/1"

@@ -6,15 +6,13 @@ from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hecbench import lens
 from hecbench.estimate import Estimate, Status
 from hecbench.recording import CameraModel, Need
+from hecbench.rendering import lens
+from hecbench.se3 import Array
 from hecbench.verdict.uncertainty import Uncertainty, uncertainty
 from hecbench.workspace import apart_m
-
-Array = NDArray[np.float64]
 
 SILHOUETTE, CORNERS, TARGET_POSES = "silhouette", "corners", "target poses"
 _REACH = 2.5

@@ -7,18 +7,16 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench.estimate import Estimate, best_first, ordering_metric
 from hecbench.recording import CameraModel, Mounting, Recording
+from hecbench.se3 import Array
 from hecbench.verdict import camera as cameras
 from hecbench.verdict import words
 from hecbench.verdict.answers import Answer, agree, answers_of, distance_m, predicts_better
 from hecbench.verdict.grade import graded
 from hecbench.verdict.result import Agreement, Expected, Rival, Verdict
 from hecbench.workspace import points_in_parent
-
-Array = NDArray[np.float64]
 
 TOLERANCE_MM = 5.0
 _WORTH = 0.9

@@ -11,9 +11,10 @@ from typing import Any
 import msgspec
 from numpy.typing import NDArray
 
-from hecbench import files, se3
+from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.estimate import Estimate, decode, plain
+from hecbench.system import files
 
 SCHEMA = "hecbench.verdict/1"
 

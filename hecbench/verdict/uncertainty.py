@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.estimate import Estimate
+from hecbench.se3 import Array
 from hecbench.statistics import CONFIDENCE
 from hecbench.verdict.result import Expected
 from hecbench.workspace import squared_displacement
-
-Array = NDArray[np.float64]
 
 _LEAST_FREEDOM = 3.0
 

@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench.errors import Refusal, SolverFailure
 from hecbench.estimate import Estimate
 from hecbench.recording import Recording
+from hecbench.se3 import Array
 from hecbench.specs import Need, Solver
 from hecbench_plugins.views.pyramid import NoMask, RaggedMasks
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

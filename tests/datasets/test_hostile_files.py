@@ -11,13 +11,14 @@ import pytest
 from hecbench_datasets.reading.pickles import plain_pickle
 from hecbench_datasets.reading.sources import yaml_value
 
-from hecbench import files, registry
+from hecbench import registry
 from hecbench.errors import InputError
 from hecbench.preparation import load_recording
 from hecbench.recording import Mounting, Recording
 from hecbench.robots import urdf_files
 from hecbench.specs import DatasetSpec, Kind
 from hecbench.storage import recording_io
+from hecbench.system import files
 
 NINE = range(1, 12)
 BOMBS = {

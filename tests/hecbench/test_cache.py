@@ -2,7 +2,7 @@
 
 import pytest
 
-from hecbench import cache
+from hecbench.system import cache
 
 
 @pytest.fixture(autouse=True)

@@ -2,7 +2,7 @@
 
 import pytest
 
-from hecbench import files
+from hecbench.system import files
 
 
 def test_a_failed_write_keeps_the_old_file_and_leaves_nothing_beside_it(tmp_path):

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from hecbench import pictures
 from hecbench.errors import InputError
 from hecbench.storage import recording_io
+from hecbench.system import pictures
 
 RAMP = np.tile(np.arange(256, dtype=np.uint8), (4, 1))
 SQUARE = np.pad(np.ones((10, 12), np.uint8), 8)

@@ -4,8 +4,8 @@ import os
 
 import pytest
 
-from hecbench import threads
 from hecbench.errors import InputError
+from hecbench.system import threads
 
 
 @pytest.fixture(autouse=True)

@@ -9,11 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hecbench import se3
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,6 @@ from hecbench.errors import InputError
 from hecbench.recording import EQUIDISTANT, OPENCV, CameraModel
 from hecbench_datasets.reading.sources import files_in
 
-Array = NDArray[np.float64]
 Picture = NDArray[np.uint8]
 
 SUFFIXES = (".bag", ".mcap", ".db3")

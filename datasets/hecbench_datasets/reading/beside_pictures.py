@@ -9,11 +9,11 @@ from pathlib import Path
 
 import numpy as np
 
-from hecbench import pictures
 from hecbench.errors import InputError
 from hecbench.exchange.conventions import HINTS_NAME
 from hecbench.exchange.pose_numbers import readings
 from hecbench.recording import CameraModel, Mounting, Recording
+from hecbench.system import pictures
 from hecbench_datasets.reading.cameras import camera_in
 from hecbench_datasets.reading.columns import Columns, Poses
 from hecbench_datasets.reading.hints import Hints, hinted_target

@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from hecbench import pictures
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel
-from hecbench_datasets.reading.sources import YAML_SUFFIXES, Array, json_value, text, yaml_value
+from hecbench.se3 import Array
+from hecbench.system import pictures
+from hecbench_datasets.reading.sources import YAML_SUFFIXES, json_value, text, yaml_value
 from hecbench_datasets.reading.tables import numpy_arrays
 
 _FILE = re.compile(r"intrinsic|camera|calib|^k$|param|config|settings|_k$|mtx", re.IGNORECASE)

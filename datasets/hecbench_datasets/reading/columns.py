@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from hecbench import se3
-from hecbench_datasets.reading.sources import Array
+from hecbench.se3 import Array
 from hecbench_datasets.reading.tables import Table, image_column
 
 ROBOT_WORDS = re.compile(

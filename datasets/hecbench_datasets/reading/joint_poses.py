@@ -12,8 +12,8 @@ from hecbench.errors import InputError
 from hecbench.exchange.pose_numbers import Reading
 from hecbench.recording import RobotDescription
 from hecbench.robots.model import KNOWN_ARMS, load_robot
+from hecbench.se3 import Array
 from hecbench_datasets.reading.arms import PANDA
-from hecbench_datasets.reading.sources import Array
 
 _RADIANS = {"rad": 1.0, "deg": np.pi / 180}
 _LIMITS = {"rad": (0.0, 3 * np.pi), "deg": (np.pi / 2, np.inf)}

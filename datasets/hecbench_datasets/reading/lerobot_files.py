@@ -11,9 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import files, pictures
 from hecbench.errors import InputError
-from hecbench_datasets.reading.sources import Array, finite, head, item, json_value
+from hecbench.se3 import Array
+from hecbench.system import files, pictures
+from hecbench_datasets.reading.sources import finite, head, item, json_value
 
 INFO = Path("meta") / "info.json"
 STATE = "observation.state"

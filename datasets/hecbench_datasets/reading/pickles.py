@@ -16,8 +16,8 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from hecbench import files
 from hecbench.errors import InputError
+from hecbench.system import files
 from hecbench_datasets.reading.sources import bounded
 
 _NUMBER = re.compile(r"[biuf][1248]")

@@ -13,8 +13,8 @@ from hecbench.errors import InputError
 from hecbench.exchange.conventions import HINTS_NAME, Proof, prove
 from hecbench.exchange.pose_numbers import Reading
 from hecbench.recording import Mounting, Recording, RobotDescription
+from hecbench.se3 import Array
 from hecbench_datasets.reading.hints import Hints
-from hecbench_datasets.reading.sources import Array
 
 _MOST_LOOKED_AT = 3
 """Readings under which the pictures are searched again."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hecbench import se3
-from hecbench_datasets.reading.sources import Array
+from hecbench.se3 import Array
 
 
 def rigid_fit(points_b: Array, points_a: Array) -> tuple[Array, float]:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import pictures
+from hecbench.system import pictures
 
 _ASKED = 5
 """Pictures looked at, evenly spread."""

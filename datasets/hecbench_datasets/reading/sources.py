@@ -13,13 +13,12 @@ from typing import Any
 
 import msgspec
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from hecbench import files
 from hecbench.errors import InputError
 from hecbench.recording import Recording
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
+from hecbench.system import files
 
 _MOST_PARTS = 2_000_000
 """Values of one file: a recording of 10,000 samples with 40 corners each has half of that."""

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 _WINDOW_S = 0.2
 """Over which a speed is taken: longer than the jitter of stamps, shorter than a stop."""

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 _GRID_S = 0.005
 _LEAST_CORRELATION = 0.5

@@ -13,16 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from hecbench import files
 from hecbench.errors import InputError
-from hecbench_datasets.reading.sources import (
-    IMAGE_SUFFIXES,
-    YAML_SUFFIXES,
-    Array,
-    json_value,
-    text,
-    yaml_value,
-)
+from hecbench.se3 import Array
+from hecbench.system import files
+from hecbench_datasets.reading.sources import IMAGE_SUFFIXES, YAML_SUFFIXES, json_value, text, yaml_value
 
 TABLE_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".xlsx", ".json", *YAML_SUFFIXES, ".npy", ".npz")
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")

@@ -9,7 +9,7 @@ import numpy as np
 
 from hecbench import se3
 from hecbench.errors import InputError
-from hecbench_datasets.reading.sources import Array
+from hecbench.se3 import Array
 from hecbench_datasets.reading.streams import interpolate
 
 

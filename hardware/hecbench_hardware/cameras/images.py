@@ -7,11 +7,11 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from hecbench import pictures
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel
 from hecbench.registry import hookimpl
 from hecbench.specs import DeviceSpec, Kind
+from hecbench.system import pictures
 from hecbench_hardware.devices import DeviceFault, Fault, Frame
 from hecbench_hardware.options import flag, text
 

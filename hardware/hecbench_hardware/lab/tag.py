@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from hecbench.se3 import Array
 from hecbench.targets import AprilTagTarget
 from hecbench_hardware.tag_edges import cells
-
-Array = NDArray[np.float64]
 
 
 def meshes(target: AprilTagTarget) -> dict[bool, tuple[Array, NDArray[np.int32]]]:

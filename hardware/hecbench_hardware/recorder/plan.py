@@ -8,10 +8,11 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from hecbench import files, se3
+from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.recording import Recording
 from hecbench.se3 import Array
+from hecbench.system import files
 from hecbench_hardware.clearance import check_motion
 from hecbench_hardware.kinematics import Arm
 from hecbench_hardware.limits import Limits

@@ -14,9 +14,9 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import files
 from hecbench.errors import HecbenchError, InputError
 from hecbench.storage.recording_io import encode_png
+from hecbench.system import files
 
 FILE_NAME = "session.jsonl"
 PLAN_NAME = "plan.json"

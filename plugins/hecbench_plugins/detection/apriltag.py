@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from hecbench import apriltags
 from hecbench.errors import InputError, TargetNotSeen
+from hecbench.se3 import Array
 from hecbench.targets import ANY_TAG, AprilTagTarget
 from hecbench_plugins.detection.pictures import each, mirrored
 
-Array = NDArray[np.float64]
 Grey = NDArray[np.uint8]
 
 FAMILIES = ("tag36h11", "tag25h9", "tag16h5", "tagCircle21h7", "tagStandard41h12")

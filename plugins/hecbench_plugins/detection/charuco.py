@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench.errors import InputError, TargetNotSeen
+from hecbench.se3 import Array
 from hecbench.targets import CharucoTarget
 from hecbench_plugins.detection.pictures import each, mirrored
 
-Array = NDArray[np.float64]
 Grey = NDArray[np.uint8]
 
 

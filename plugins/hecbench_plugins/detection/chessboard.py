@@ -8,9 +8,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from hecbench.se3 import Array
 from hecbench_plugins.detection.orientation import is_regular, unmirrored
 
-Array = NDArray[np.float64]
 Grey = NDArray[np.uint8]
 
 _WINDOW_PX = (2, 10)

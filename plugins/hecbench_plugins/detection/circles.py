@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from hecbench.se3 import Array
 from hecbench_plugins.detection.orientation import is_regular, turned_grids, unmirrored
 
-Array = NDArray[np.float64]
 Grey = NDArray[np.uint8]
 
 _LARGER = 1.25

@@ -6,17 +6,16 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench.errors import InputError, TargetNotSeen
 from hecbench.recording import CameraModel, Recording
+from hecbench.se3 import Array
 from hecbench.targets import AprilTagTarget, CharucoTarget, ChessboardTarget, PointsTarget, Target, grid_shape
 from hecbench_plugins.detection import apriltag, charuco, chessboard, circles
 from hecbench_plugins.detection.intrinsics import calibrate
 from hecbench_plugins.detection.orientation import choose_turns, turned_grids
 from hecbench_plugins.detection.pictures import Grey, Greys, each
 
-Array = NDArray[np.float64]
 Found = list[Array | None]
 
 

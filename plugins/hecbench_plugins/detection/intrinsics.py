@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 LEAST_IMAGES = 3
 LEAST_POINTS = 6

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 _ANGLE_SIGMA_RAD = np.deg2rad(2.0)
 _ROBUST_LIMIT = 25.0

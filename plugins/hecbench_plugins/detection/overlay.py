@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import files
 from hecbench.recording import Recording
 from hecbench.storage.recording_io import encode_png
+from hecbench.system import files
 
 Picture = NDArray[np.uint8]
 

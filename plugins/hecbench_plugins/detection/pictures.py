@@ -14,9 +14,10 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import apriltags, threads
-from hecbench.cache import Cache
+from hecbench import apriltags
 from hecbench.recording import Recording
+from hecbench.system import threads
+from hecbench.system.cache import Cache
 
 Grey = NDArray[np.uint8]
 Result = TypeVar("Result")

@@ -6,15 +6,13 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3, statistics
 from hecbench.estimate import Estimate, Status
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
+from hecbench.se3 import Array
 from hecbench.specs import Column, EvaluatorSpec, Need, ResultSection
-
-Array = NDArray[np.float64]
 
 FOLDS = 5
 _NEEDS = frozenset({Need.IMAGES, Need.ROBOT_MODEL, Need.JOINTS, Need.INTRINSICS})

@@ -11,14 +11,13 @@ from numpy.typing import NDArray
 
 from hecbench import se3, statistics
 from hecbench.estimate import Estimate, Status
-from hecbench.lens import same
 from hecbench.recording import CameraModel, Recording
 from hecbench.registry import hookimpl
+from hecbench.rendering.lens import same
+from hecbench.samples.standstills import standstills
+from hecbench.se3 import Array
 from hecbench.specs import Column, EvaluatorSpec, Need, ResultSection
-from hecbench.standstills import standstills
 from hecbench_plugins.markers.target_poses import project, target_poses
-
-Array = NDArray[np.float64]
 
 FOLDS = 5
 _COLUMNS = (Column("reprojection_px", "px"), Column("target_mm", "mm"), Column("target_deg", "deg"))

@@ -19,11 +19,10 @@ from hecbench.estimate import Estimate
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.robots.posed import PosedRobot
+from hecbench.se3 import Array
 from hecbench.specs import Column, EvaluatorSpec, Need, ResultSection
 from hecbench.targets import PointsTarget
 from hecbench_plugins.markers.target_poses import MINIMUM_POINTS, project
-
-Array = NDArray[np.float64]
 
 THRESHOLDS_PX = (20, 30, 40, 50, 100, 150, 200)
 _AREA_PX, _BAXTER_AREA_MM, _DREAM_AREA_MM = 200, 400, 100

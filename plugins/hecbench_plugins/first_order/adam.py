@@ -8,9 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 _BETAS, _EPSILON = (0.9, 0.999), 1e-8
 

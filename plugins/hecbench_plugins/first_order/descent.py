@@ -9,12 +9,12 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
 from hecbench import se3
 from hecbench.errors import SolverFailure
 from hecbench.estimate import Estimate, Status, Termination
+from hecbench.se3 import Array
 from hecbench_plugins.first_order.adam import Adam
 from hecbench_plugins.first_order.drawing import Drawer
 from hecbench_plugins.first_order.poses import PoseNumbers
@@ -22,8 +22,6 @@ from hecbench_plugins.first_order.rendered import rendered
 from hecbench_plugins.second_order import evidence
 from hecbench_plugins.second_order.descent import Trace
 from hecbench_plugins.views.pyramid import View
-
-Array = NDArray[np.float64]
 
 _TOLD_STEPS = 40
 

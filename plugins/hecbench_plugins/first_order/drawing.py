@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from hecbench.rendering import Renderer, RenderMesh
 from hecbench.robots.model import RobotModel
+from hecbench.se3 import Array
 from hecbench_plugins.first_order import kernels
 from hecbench_plugins.views.pyramid import View, meshes_by_level
 
-Array = NDArray[np.float64]
 Picture = NDArray[np.float32]
 
 MASK = np.array([[1.0], [0.0]], np.float32)

@@ -21,13 +21,13 @@ from typing import Any
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
 from hecbench import registry, se3
 from hecbench.errors import Refusal
 from hecbench.estimate import Estimate
 from hecbench.recording import Recording
+from hecbench.se3 import Array
 from hecbench.specs import Kind, Translator, TranslatorSpec
 from hecbench_plugins.first_order.backend import Backend, drawer
 from hecbench_plugins.first_order.descent import AdamSettings, DescentHistory, Verdict, answer, descend
@@ -37,8 +37,6 @@ from hecbench_plugins.first_order.masks import mask_of
 from hecbench_plugins.first_order.poses import EulerAngles, Increment, PoseNumbers
 from hecbench_plugins.first_order.simlike import cut_out, why_not_simulated
 from hecbench_plugins.views.pyramid import Picture, View, prepare
-
-Array = NDArray[np.float64]
 
 _RATE = 2e-3
 _REFERENCE_WIDTH_PX = 640

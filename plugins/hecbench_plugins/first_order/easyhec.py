@@ -12,13 +12,13 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from torch import Tensor
 
 from hecbench import se3
 from hecbench.errors import Refusal
 from hecbench.estimate import Estimate
 from hecbench.recording import Recording
+from hecbench.se3 import Array
 from hecbench_plugins.first_order.backend import Backend
 from hecbench_plugins.first_order.descent import AdamSettings, Verdict, answer, descend
 from hecbench_plugins.first_order.hemisphere import best_on_hemisphere
@@ -26,8 +26,6 @@ from hecbench_plugins.first_order.losses import SquaredError
 from hecbench_plugins.first_order.masks import MaskMode, mask_drawers, mask_of
 from hecbench_plugins.first_order.poses import LogVector
 from hecbench_plugins.views.pyramid import prepare
-
-Array = NDArray[np.float64]
 
 _RATE, _WEIGHT_DECAY = 3e-3, 5e-4
 

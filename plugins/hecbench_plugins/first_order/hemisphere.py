@@ -11,16 +11,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.errors import Refusal
 from hecbench.recording import Mounting, Recording
+from hecbench.se3 import Array
 from hecbench_plugins.second_order.descent import Trace, draw_counted
 from hecbench_plugins.second_order.silhouette import centroid_and_area
 from hecbench_plugins.views.pyramid import View
-
-Array = NDArray[np.float64]
 
 DIRECTIONS = 500
 _FIRST_DISTANCE_M = 2.0

@@ -17,13 +17,13 @@ from dataclasses import dataclass
 
 import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
 from hecbench import se3
 from hecbench.errors import Refusal
 from hecbench.estimate import Estimate
 from hecbench.recording import Recording
+from hecbench.se3 import Array
 from hecbench_plugins.first_order.backend import Backend
 from hecbench_plugins.first_order.descent import AdamSettings, Verdict, answer, descend
 from hecbench_plugins.first_order.drawing import Drawer
@@ -31,8 +31,6 @@ from hecbench_plugins.first_order.losses import SquaredError
 from hecbench_plugins.first_order.masks import mask_drawers, mask_of
 from hecbench_plugins.first_order.poses import Increment, PoseNumbers
 from hecbench_plugins.views.pyramid import Picture, prepare
-
-Array = NDArray[np.float64]
 
 _RATE = 2e-3
 _APPEARANCE_WEIGHTS = 1e-3, 1.0

@@ -19,10 +19,9 @@ from torch import Tensor
 
 from hecbench.errors import Refusal
 from hecbench.rendering import RenderMesh
+from hecbench.se3 import Array
 from hecbench_plugins.first_order.drawing import Box
 from hecbench_plugins.views.pyramid import Picture, View
-
-Array = NDArray[np.float64]
 
 _NEAR_M, _FAR_M = 0.05, 10.0
 

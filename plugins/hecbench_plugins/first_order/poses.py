@@ -10,12 +10,10 @@ from math import factorial
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
+from hecbench.se3 import Array
 from hecbench_plugins.first_order import kernels
-
-Array = NDArray[np.float64]
 
 _SERIES = 24
 

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
 import torch
-from numpy.typing import NDArray
 from torch import Tensor
 
+from hecbench.se3 import Array
 from hecbench_plugins.first_order.drawing import Drawer
 from hecbench_plugins.first_order.poses import PoseNumbers
-
-Array = NDArray[np.float64]
 
 
 class _Render(torch.autograd.Function):

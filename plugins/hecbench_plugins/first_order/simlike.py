@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from hecbench.se3 import Array
 from hecbench_plugins.views.pyramid import Picture, View
-
-Array = NDArray[np.float64]
 
 _BLACK = 0.02
 _SOFT_EDGE_PX = 2

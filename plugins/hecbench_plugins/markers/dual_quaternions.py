@@ -7,11 +7,9 @@ matrices of the left and of the right product.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 
 def left_matrix(q: Array) -> Array:

@@ -15,14 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
-from hecbench.agreement import contradiction
 from hecbench.errors import Refusal, SolverFailure
 from hecbench.estimate import Estimate
 from hecbench.recording import Recording
-from hecbench.standstills import one_per_robot_pose
+from hecbench.samples.agreement import contradiction
+from hecbench.samples.standstills import one_per_robot_pose
+from hecbench.se3 import Array
 from hecbench_plugins.markers.target_poses import target_poses
-
-Array = NDArray[np.float64]
 
 MINIMUM_SAMPLES = 3
 _MOST_COMPARED = 800

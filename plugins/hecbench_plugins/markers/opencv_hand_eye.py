@@ -8,13 +8,11 @@ camera_T_target and H and returns inverse(Y) and inverse(X).
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.errors import Refusal
+from hecbench.se3 import Array
 from hecbench_plugins.markers.hand_eye import PosedSamples, require_two_rotation_axes
-
-Array = NDArray[np.float64]
 
 
 def hand_eye(pairs: PosedSamples, method: int) -> Array:

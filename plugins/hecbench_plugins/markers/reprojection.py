@@ -5,23 +5,21 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
-from hecbench.agreement import LARGEST_SHARE, share_left
 from hecbench.bundle.adjustment import Solution, adjust
 from hecbench.bundle.model import Noise, Problem, State, linearise, start
 from hecbench.errors import Refusal, SolverFailure
 from hecbench.estimate import Estimate
-from hecbench.lens import FixedSensor, Sensor, parameters_of
 from hecbench.recording import Recording
-from hecbench.standstills import one_per_robot_pose
+from hecbench.rendering.lens import FixedSensor, Sensor, parameters_of
+from hecbench.samples.agreement import LARGEST_SHARE, share_left
+from hecbench.samples.standstills import one_per_robot_pose
+from hecbench.se3 import Array
 from hecbench_plugins.markers import single3d
 from hecbench_plugins.markers.hand_eye import pose_pairs
 from hecbench_plugins.markers.opencv_hand_eye import robot_world
 from hecbench_plugins.markers.target_poses import planar_candidates
-
-Array = NDArray[np.float64]
 
 DEFAULT_NOISE = Noise(0.3, float(np.deg2rad(0.05)), 5e-4)
 """A corner, and a good arm: px, rad, m."""

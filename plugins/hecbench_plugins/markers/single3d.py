@@ -12,16 +12,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
-from hecbench.agreement import LARGEST_SHARE, percent, share_left
 from hecbench.errors import Refusal, SolverFailure
 from hecbench.estimate import Estimate, Termination
 from hecbench.recording import Recording
+from hecbench.samples.agreement import LARGEST_SHARE, percent, share_left
+from hecbench.se3 import Array
 from hecbench_plugins.markers.hand_eye import MINIMUM_ROTATION_DEG, posed_samples, rotation_diversity_deg
-
-Array = NDArray[np.float64]
 
 COPLANAR_CONDITION = 300.0
 """Above it the marker positions nearly lie in a plane and the closed form is off by decimetres; healthy is 5."""

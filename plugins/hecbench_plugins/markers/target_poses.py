@@ -10,14 +10,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import lens, se3
+from hecbench import se3
 from hecbench.bundle.pictures import refined
 from hecbench.errors import Refusal
-from hecbench.lens import FixedSensor, normalised
 from hecbench.recording import CameraModel, Recording
+from hecbench.rendering import lens
+from hecbench.rendering.lens import FixedSensor, normalised
+from hecbench.se3 import Array
 from hecbench.targets import Target
-
-Array = NDArray[np.float64]
 
 MINIMUM_POINTS = 4
 _PIXEL_SIGMA_PX = 0.5

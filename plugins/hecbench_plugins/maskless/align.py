@@ -16,15 +16,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import se3, threads
+from hecbench import se3
 from hecbench.rendering import Renderer, RenderMesh
 from hecbench.rendering.undistort import shrunk_intrinsics
+from hecbench.se3 import Array
+from hecbench.system import threads
 from hecbench_plugins.maskless import kernels
 from hecbench_plugins.views import scene_background
 from hecbench_plugins.views.canvas import Canvas, Images
 from hecbench_plugins.views.spool import Spool
-
-Array = NDArray[np.float64]
 
 HALF_LINE = 8
 """Samples on each side of the contour."""

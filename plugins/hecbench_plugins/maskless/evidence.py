@@ -6,13 +6,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.estimate import Estimate, Termination
+from hecbench.se3 import Array
 from hecbench_plugins.maskless.align import CORRELATED_POINTS, ContourEquations, Refined
-
-Array = NDArray[np.float64]
 
 _PRIOR_FREEDOM = 6.0
 _DOUBTFUL = 0.5

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.robots.posed import PosedRobot
+from hecbench.se3 import Array
 from hecbench_plugins.maskless.align import (
     CORRELATED_POINTS,
     FEWEST_POINTS,
@@ -21,8 +21,6 @@ from hecbench_plugins.maskless.align import (
     settled,
 )
 from hecbench_plugins.second_order.unknowns import told
-
-Array = NDArray[np.float64]
 
 PRIOR_RAD = float(np.deg2rad(0.1))
 """Standard deviation of an arm's constant joint offsets about the nominal model."""

@@ -15,13 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import se3, threads
+from hecbench import se3
 from hecbench.rendering import Renderer, RenderMesh
 from hecbench.rendering.undistort import shrunk_intrinsics
+from hecbench.se3 import Array
+from hecbench.system import threads
 from hecbench_plugins.maskless import kernels
 from hecbench_plugins.views.canvas import Canvas
-
-Array = NDArray[np.float64]
 
 SEARCH_LEVEL = 8
 """Of the meshes: pictures of WIDTH_PX show no more."""

@@ -14,6 +14,7 @@ from hecbench.estimate import Estimate
 from hecbench.recording import Mounting, Recording
 from hecbench.rendering import RenderMesh
 from hecbench.robots.posed import PosedRobot
+from hecbench.se3 import Array
 from hecbench_plugins.maskless import evidence
 from hecbench_plugins.maskless.align import (
     FEWEST_POINTS,
@@ -32,8 +33,6 @@ from hecbench_plugins.start_search.view_sphere import ViewSphere
 from hecbench_plugins.views import scene_background
 from hecbench_plugins.views.canvas import Canvas, undistorted_canvas
 from hecbench_plugins.views.pyramid import meshes_by_level, photographed_robot
-
-Array = NDArray[np.float64]
 
 NEAR, FAR = Ball(0.1, np.deg2rad(10)), Ball(0.2, np.deg2rad(20))
 """How far off a start may be."""

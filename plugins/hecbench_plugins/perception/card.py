@@ -10,8 +10,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import files
 from hecbench.errors import InputError, Refusal
+from hecbench.system import files
 from hecbench_plugins.perception.skeleton import Keypoint
 
 CARD = "model.json"

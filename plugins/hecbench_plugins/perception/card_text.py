@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from hecbench import files
+from hecbench.system import files
 from hecbench_plugins.perception.card import ModelCard
 
 PAGE = "README.md"

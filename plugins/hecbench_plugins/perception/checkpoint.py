@@ -12,8 +12,8 @@ from safetensors import SafetensorError
 from safetensors.torch import load, save
 from torch import Tensor, nn
 
-from hecbench import files
 from hecbench.errors import InputError
+from hecbench.system import files
 
 
 @dataclass

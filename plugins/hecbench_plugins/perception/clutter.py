@@ -6,10 +6,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from hecbench.se3 import Array
 from hecbench_plugins.perception.appearance import Appearance
 
 Floats = NDArray[np.float32]
-Array = NDArray[np.float64]
 
 _SUBPIXEL_BITS = 3
 _TUBE_STRIPS = 9

@@ -13,9 +13,8 @@ from hecbench.errors import InputError
 from hecbench.rendering import RenderMesh
 from hecbench.rendering.smooth import Normals, normals
 from hecbench.robots.model import RobotModel, load_robot
+from hecbench.se3 import Array
 from hecbench_plugins.perception.skeleton import Keypoint, keypoint_positions, keypoints_of
-
-Array = NDArray[np.float64]
 
 MOST_COLOURS = 4
 _SAME_COLOUR = 0.05

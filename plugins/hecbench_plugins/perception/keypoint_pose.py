@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.errors import SolverFailure
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 _MINIMAL_POINTS = 4
 _CONFIDENCE = 0.9999

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench.errors import InputError
+from hecbench.se3 import Array
 from hecbench_plugins.perception.card import ModelCard, read_card
 from hecbench_plugins.perception.plan import STRIDE
 from hecbench_plugins.perception.skeleton import keypoint_positions
 
-Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 
 _COARSE_PX, _FINE_PX = (320, 448), (224, 288)

@@ -20,7 +20,6 @@ from hecbench_plugins.perception.clutter import Clutter
 from hecbench_plugins.perception.family import Family
 from hecbench_plugins.perception.scene import SUPERSAMPLING, Scene, random_scene
 
-Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 Bytes = NDArray[np.uint8]
 

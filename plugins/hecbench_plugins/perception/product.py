@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import files
+from hecbench.system import files
 from hecbench_plugins.perception import checkpoint
 from hecbench_plugins.perception.card import FORMAT, ModelCard, write_card
 from hecbench_plugins.perception.card_text import write_page

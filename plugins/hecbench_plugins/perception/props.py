@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from hecbench import se3
 from hecbench.rendering import Renderer, RenderMesh
 from hecbench.robots.model import RobotModel, load_robot
+from hecbench.se3 import Array
 from hecbench_plugins.perception.appearance import Appearance
 from hecbench_plugins.perception.scene import Scene
 
-Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.rendering import Renderer
+from hecbench.se3 import Array
 from hecbench_plugins.perception.family import Arm
 
-Array = NDArray[np.float64]
 Rng = np.random.Generator
 
 SUPERSAMPLING = 2

@@ -6,13 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from hecbench.errors import InputError
 from hecbench.robots.joints import Motion
 from hecbench.robots.model import RobotModel
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 _SAME_POINT_M = 0.03
 """A link's points nearer than this are one."""

@@ -6,9 +6,9 @@ import json
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from hecbench import files
 from hecbench.errors import InputError
 from hecbench.storage.recording_io import target_json
+from hecbench.system import files
 from hecbench.targets import Target
 from hecbench_plugins.printing.shapes import Pattern, Rectangle, pattern
 

@@ -9,12 +9,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
-from hecbench import se3, threads
+from hecbench import se3
+from hecbench.se3 import Array
+from hecbench.system import threads
 from hecbench_plugins.views.pyramid import Level, View
 
-Array = NDArray[np.float64]
 NormalEquations = tuple[float, Array, Array]
 """Cost, J'WJ (6, 6) and -J'Wr (6,)."""
 

@@ -11,12 +11,11 @@ from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.estimate import Estimate, Termination
+from hecbench.se3 import Array
 from hecbench_plugins.second_order.descent import Descent, Trace, draw_counted
 from hecbench_plugins.second_order.photometry import Photometry
 from hecbench_plugins.second_order.silhouette import contour_rows, distances_at, outer
 from hecbench_plugins.views.pyramid import View
-
-Array = NDArray[np.float64]
 
 _BLIND = 1e-12
 _PATH_STEPS = 40

@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
+from hecbench.se3 import Array
 from hecbench_plugins.second_order import kernels
 from hecbench_plugins.second_order.descent import SMALL_STEP, Trace, draw_counted
 from hecbench_plugins.second_order.photometry import Photometry
 from hecbench_plugins.views.pyramid import Level, View
-
-Array = NDArray[np.float64]
 
 _MASK_REACH_PX = 2
 _VIOLATION_CLIP_PX = 0.1

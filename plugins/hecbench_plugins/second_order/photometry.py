@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench.rendering import Crossings
+from hecbench.se3 import Array
 from hecbench_plugins.second_order import kernels
 from hecbench_plugins.second_order.descent import NormalEquations, Trace, draw_all, draw_uncounted
 from hecbench_plugins.second_order.silhouette import FEWEST_CROSSINGS
 from hecbench_plugins.views.pyramid import Level, View
-
-Array = NDArray[np.float64]
 
 _FEWEST_PURE = 10
 _FEWEST_PARTS = 4

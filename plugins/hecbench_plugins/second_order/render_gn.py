@@ -12,13 +12,13 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.errors import Refusal, SolverFailure
 from hecbench.estimate import Estimate, Termination
 from hecbench.recording import CameraModel, Recording
 from hecbench.robots.posed import PosedRobot
+from hecbench.se3 import Array
 from hecbench_plugins.second_order import evidence
 from hecbench_plugins.second_order.descent import Trace, descend, draw_counted
 from hecbench_plugins.second_order.flatness import MOST_UNEVEN, unevenness
@@ -27,8 +27,6 @@ from hecbench_plugins.second_order.photometry import Photometry, tone_exponent
 from hecbench_plugins.second_order.silhouette import centroid_and_area, distances_at, silhouette_step
 from hecbench_plugins.second_order.unknowns import ExtendedPhotometry, Unknown, solve
 from hecbench_plugins.views.pyramid import RaggedMasks, View, linearised, prepare
-
-Array = NDArray[np.float64]
 
 _TERMINATIONS = {
     "converged": Termination.CONVERGED,

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench.rendering import Crossings
+from hecbench.se3 import Array
 from hecbench_plugins.second_order import kernels
 from hecbench_plugins.second_order.descent import (
     NormalEquations,
@@ -17,8 +18,6 @@ from hecbench_plugins.second_order.descent import (
     draw_uncounted,
 )
 from hecbench_plugins.views.pyramid import Level, View, signed_distance
-
-Array = NDArray[np.float64]
 
 FEWEST_CROSSINGS = 30
 

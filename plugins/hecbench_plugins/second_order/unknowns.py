@@ -8,16 +8,14 @@ from enum import StrEnum
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.rendering import Crossings
 from hecbench.robots.posed import PosedRobot
+from hecbench.se3 import Array
 from hecbench_plugins.second_order.descent import Descent, NormalEquations
 from hecbench_plugins.second_order.photometry import Photometry
 from hecbench_plugins.views.pyramid import Level, View
-
-Array = NDArray[np.float64]
 
 _UNSEEN = 0.8
 """Share of the prior's standard deviation that must be left for an unknown to count as not observable."""

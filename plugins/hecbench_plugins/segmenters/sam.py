@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from hecbench.errors import InputError, Refusal
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
+from hecbench.se3 import Array
 from hecbench.specs import Need, Option, SegmenterSpec
 from hecbench_plugins.views.uncertainty import Uncertainty
 
-Array = NDArray[np.float64]
 Floats = NDArray[np.float32]
 Mask = NDArray[np.bool_]
 

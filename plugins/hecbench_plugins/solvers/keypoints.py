@@ -24,7 +24,6 @@ from hecbench_plugins.perception.options import MODEL_OPTION
 if TYPE_CHECKING:
     from hecbench_plugins.perception.keypoint_pose import Sightings
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.uint8]
 
 _ROBOT = 0.5

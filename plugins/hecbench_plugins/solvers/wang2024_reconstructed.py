@@ -12,12 +12,12 @@ from dataclasses import dataclass
 from enum import StrEnum
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench.errors import Refusal
 from hecbench.estimate import Estimate
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
+from hecbench.se3 import Array
 from hecbench.specs import Need, SolverSpec
 from hecbench_plugins.markers import dual_quaternions
 from hecbench_plugins.markers.hand_eye import (
@@ -27,8 +27,6 @@ from hecbench_plugins.markers.hand_eye import (
     pose_pairs,
     rotation_diversity_deg,
 )
-
-Array = NDArray[np.float64]
 
 _ITERATIONS = 50
 _CONVERGED_STEP = 1e-12

@@ -12,7 +12,6 @@ from dataclasses import dataclass, field, replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.errors import Refusal, SolverFailure
@@ -21,6 +20,7 @@ from hecbench.recording import Mounting, Recording
 from hecbench.rendering import Renderer, RenderMesh
 from hecbench.rendering.undistort import shrunk_intrinsics
 from hecbench.robots.model import RobotModel
+from hecbench.se3 import Array
 from hecbench_plugins.second_order.descent import Trace, descend
 from hecbench_plugins.second_order.render_gn import RenderGN
 from hecbench_plugins.second_order.silhouette import silhouette_step
@@ -35,8 +35,6 @@ from hecbench_plugins.views.pyramid import (
     shrink,
     signed_distance,
 )
-
-Array = NDArray[np.float64]
 
 _SEARCH_PX, _SMALLEST = 80, 8
 """Longer side of a mask at the size of the search, and the most pixels of the recording in one there."""

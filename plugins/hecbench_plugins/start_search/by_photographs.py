@@ -10,14 +10,14 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import se3, threads
+from hecbench import se3
 from hecbench.rendering import Renderer, RenderMesh
 from hecbench.rendering.undistort import shrunk_intrinsics
+from hecbench.se3 import Array
+from hecbench.system import threads
 from hecbench_plugins.start_search.kernels import coverage
 from hecbench_plugins.start_search.view_sphere import ViewSphere, best_apart, look_at
 from hecbench_plugins.views.canvas import Canvas
-
-Array = NDArray[np.float64]
 
 _DISTANCES = (1.2, 1.6, 2.1, 2.8, 3.7, 4.9)
 """Of the camera, in spans of the moving links."""

@@ -6,11 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 _GOLDEN_RAD = np.pi * (3 - np.sqrt(5))
 """Between neighbours of a Fibonacci lattice (Gonzalez 2010)."""

@@ -10,8 +10,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import files
 from hecbench.errors import InputError
+from hecbench.system import files
 
 Picture = NDArray[np.float32]
 

@@ -13,8 +13,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from hecbench import files
 from hecbench.errors import InputError
+from hecbench.system import files
 from hecbench_plugins.perception import checkpoint
 from hecbench_plugins.perception.checkpoint import Progress
 from hecbench_plugins.perception.family import Family

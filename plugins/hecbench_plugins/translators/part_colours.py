@@ -15,9 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench.registry import hookimpl
+from hecbench.se3 import Array
 from hecbench.specs import TranslatorSpec
 
-Array = NDArray[np.float64]
 Picture = NDArray[np.float32]
 
 _FEWEST_PIXELS = 30

@@ -13,9 +13,9 @@ from hecbench.errors import InputError, Refusal
 from hecbench.recording import EQUIDISTANT, CameraModel, Recording
 from hecbench.rendering.undistort import shrunk_intrinsics
 from hecbench.robots.posed import PosedRobot
+from hecbench.se3 import Array
 from hecbench_plugins.views.spool import Spool
 
-Array = NDArray[np.float64]
 Images = NDArray[np.uint8]
 
 PAD_PX = 60

@@ -14,8 +14,8 @@ from hecbench.rendering import Renderer, RenderMesh
 from hecbench.rendering.undistort import Undistortion, shrunk_intrinsics
 from hecbench.robots.model import RobotModel
 from hecbench.robots.posed import PosedRobot
+from hecbench.se3 import Array
 
-Array = NDArray[np.float64]
 Picture = NDArray[np.float32]
 
 LEVELS = (4, 2, 1)

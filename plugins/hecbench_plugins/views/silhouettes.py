@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.errors import InputError, Refusal
-from hecbench.lens import undistort
 from hecbench.recording import CameraModel, Recording
 from hecbench.rendering import Renderer
+from hecbench.rendering.lens import undistort
 from hecbench.rendering.undistort import shrunk_intrinsics
+from hecbench.se3 import Array
 from hecbench_plugins.views.pyramid import meshes_by_level, photographed_robot
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 _WIDEST = 3.0

@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import threads
 from hecbench.errors import HecbenchError
+from hecbench.system import threads
 
 Picture = NDArray[np.uint8]
 

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 
 @dataclass(frozen=True)

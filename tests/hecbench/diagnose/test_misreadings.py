@@ -9,7 +9,7 @@ from hecbench_datasets.synthetic_misreadings import MISREADINGS, near_board
 from hecbench import se3
 from hecbench.diagnose import Severity, check
 from hecbench.diagnose.clock_lag import interpolated
-from hecbench.standstills import one_per_robot_pose, standstills
+from hecbench.samples.standstills import one_per_robot_pose, standstills
 
 
 def critical(recording):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from hecbench_plugins.detection import pictures
 
-from hecbench import cache, threads
+from hecbench.system import cache, threads
 
 LOOKED = []
 

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from hecbench_plugins.views.spool import Spool
 
-from hecbench import threads
 from hecbench.errors import HecbenchError
+from hecbench.system import threads
 
 
 def test_pictures_come_back_as_they_were(rng, tmp_path, monkeypatch):

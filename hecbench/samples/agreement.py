@@ -7,11 +7,9 @@ without a common calibration leave the typical target as far from its prediction
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 LARGEST_SHARE = 0.25
 """Of its own motion that a target may be off; good data leave a few per cent, small tags with flips a tenth."""

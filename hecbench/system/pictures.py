@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import files
 from hecbench.errors import InputError
+from hecbench.system import files
 
 Image = NDArray[np.uint8]
 

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
-from hecbench.agreement import share_left
 from hecbench.recording import Recording
+from hecbench.samples.agreement import share_left
+from hecbench.se3 import Array
 
-Array = NDArray[np.float64]
 Labels = NDArray[np.int64]
 
 STILL_M = 2e-4

@@ -11,8 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench.recording import EQUIDISTANT, CameraModel
-
-Array = NDArray[np.float64]
+from hecbench.se3 import Array
 
 _STEP = 1e-20
 """Of the complex-step derivatives (Squire and Trapp 1998), which are exact to rounding for any small step."""
