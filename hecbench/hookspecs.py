@@ -312,7 +312,47 @@ def hecbench_translators() -> Iterable[TranslatorSpec]:
 
 @hookspec
 def hecbench_perception() -> Iterable[PerceptionSpec]:
-    """Trained networks that find a robot in photographs."""
+    """Trained networks that find a robot in photographs.
+
+    ```python
+    import numpy as np
+
+    from hecbench.registry import hookimpl
+    from hecbench.specs import PerceptionSpec
+
+
+    class Nothing:
+        '''What an empty picture shows.'''
+
+        def __init__(self, height, width):
+            self._size = height, width
+            self.keypoints, self.trust = np.zeros((1, 2)), np.zeros(1)
+
+        def visible(self):
+            return np.zeros(self._size, np.float32)
+
+        def whole(self):
+            return np.zeros(self._size, np.float32)
+
+        def colours(self):
+            return np.zeros((*self._size, 3), np.float32)
+
+
+    class Untaught:
+        '''A network before its first lesson: it sees no robot anywhere.'''
+
+        def see(self, image):
+            return Nothing(*image.shape[:2])
+
+        def keypoint_positions(self, robot, links, frame_T_link):
+            return frame_T_link[..., -1:, :3, 3]
+
+
+    @hookimpl
+    def hecbench_perception():
+        yield PerceptionSpec(name="untaught", summary="sees nothing", robots=("ur5e",), factory=Untaught)
+    ```
+    """
     raise NotImplementedError
 
 

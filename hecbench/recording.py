@@ -374,7 +374,9 @@ def _update(digest: Any, value: Any) -> None:
     elif hasattr(value, "__dataclass_fields__"):
         for item in fields(value):
             part = getattr(value, item.name)
-            if item.name != "distortion_model" or part != OPENCV:  # 0.1 had no such field: digests stay the same
+            if (
+                item.name != "distortion_model" or part != OPENCV
+            ):  # 0.1 had no such field: digests stay the same
                 _update(digest, part)
     else:
         digest.update(repr(value).encode())

@@ -6,13 +6,21 @@ import numpy as np
 
 from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity
+from hecbench.targets import Target
 
 ID = "coverage"
 FEW_SAMPLES = 8
+_LEAST_POINTS = 4
+"""Of a target whose pose can be computed from its corners."""
 FLAT = 0.05
 """Smallest over largest extent of the target positions below which they count as coplanar."""
 NARROW = 0.03
 """Of the distance: positions closer together than that are seen under nearly the same angle."""
+
+
+def _has_a_pose(target: Target | None) -> bool:
+    """Whether a pose can be seen of it; fewer points are labels on the robot, which only measure."""
+    return target is None or len(target.points_m) >= _LEAST_POINTS
 
 
 def examine(case: Examination) -> tuple[Finding | None, Examination]:
@@ -22,7 +30,7 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
             return None, case
         summary = f"{len(case.usable)} samples have a robot pose and a target pose"
         severity = Severity.INFO if len(case.usable) >= FEW_SAMPLES else Severity.WARNING
-        if not len(case.usable):
+        if not len(case.usable) and _has_a_pose(case.recording.target):
             summary = "no sample has a robot pose and a target pose: there is nothing to examine"
             summary = "; ".join([summary, *case.said])
             severity = Severity.CRITICAL

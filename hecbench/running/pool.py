@@ -89,7 +89,7 @@ def on_cluster(
         raise InputError(
             f"--executor {scheduler}: no scheduler answers ({error}); give its tcp://host:port"
         ) from error
-    with client:
+    with client, client.as_current():
         futures = {client.submit(execute, task, *arguments, pure=False): task for task in tasks}
         for future in distributed.as_completed(futures):
             task = futures.pop(future)

@@ -89,9 +89,9 @@ def rewrite(cell, change):
 
 def test_bad_input_is_one_line_and_exit_2(hecbench, refused, cell, tmp_path):
     refused(hecbench("solve", tmp_path / "nowhere"), "nowhere", "does not exist")
-    refused(hecbench("solve", tmp_path), "no known recording")
+    refused(hecbench("solve", tmp_path), "cell/recording.json", "nearest")
     refused(hecbench("solve", cell, "--solver", "tasi"), "tasi", "choose one of")
-    refused(hecbench("solve", cell, "--solver", "shah", "--segmenter", "sam"), "sam", "choose one of")
+    refused(hecbench("solve", cell, "--solver", "shah", "--segmenter", "no_such"), "no_such", "choose one of")
     refused(hecbench("solve", cell, "--views", 99), "--views 99")
     (tmp_path / "junk.json").write_text("{}")
     refused(hecbench("solve", cell, "--init", tmp_path / "junk.json"), "junk.json")

@@ -73,5 +73,5 @@ def test_resume_keeps_the_results_of_each_segmenter_apart(tmp_path):
 
 
 def test_an_unknown_segmenter_is_bad_usage(scene):
-    with pytest.raises(InputError, match="no segmenter is called 'sam'"):
-        planning.solvers_for(("park",), scene, "sam")
+    with pytest.raises(InputError, match="no segmenter is called 'no_such'"):
+        planning.solvers_for(("park",), scene, "no_such")

@@ -156,8 +156,8 @@ def test_options_that_are_not_understood_are_named(name):
 
 
 def test_a_translator_that_does_not_exist_is_named(scene, solve):
-    with pytest.raises(InputError, match="no translator is called 'cyclegan'"):
-        solve("drhec[translator=cyclegan]", scene)
+    with pytest.raises(InputError, match="no translator is called 'no_such'"):
+        solve("drhec[translator=no_such]", scene)
 
 
 def test_pictures_that_are_not_simulated_are_told_in_the_tables(start_off, solve):

@@ -162,7 +162,7 @@ def test_half_turn_selection_keeps_what_it_can(rng):
         ("ur3e_cam1_as_shipped", 3.32, 16.3),
         ("camodocal_ur", 4.0, 6.8),
         ("franka_charuco", 0.72, 3.4),
-        ("ethz_arm_sim", 0.21, 1.5),
+        ("ethz_arm_sim", 0.26, 1.64),  # one sample per robot pose, 61 of 150
     ],
 )
 def test_reference_spreads_are_reproduced(shared, folder, spread_deg, spread_mm):
@@ -186,5 +186,5 @@ def test_daniilidis_survives_the_recording_that_breaks_opencv(shared):
     recording = preparation.load_recording(shared / "data" / "ethz_arm_sim")
     (estimate,) = solving.solve(recording, [registry.load().get(Kind.SOLVER, "daniilidis", SolverSpec)])
     assert estimate.status is Status.OK
-    assert estimate.diagnostics["target_spread_deg"] < 0.25
+    assert estimate.diagnostics["target_spread_deg"] < 0.27  # one sample per robot pose, 61 of 150
     assert estimate.diagnostics["target_spread_mm"] < 3.0
