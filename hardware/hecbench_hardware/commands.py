@@ -26,7 +26,7 @@ _file = click.Path(path_type=Path, dir_okay=False)
 @click.option("--model", default="ur5e", show_default=True, help="ur3e, ur5e or ur10e.")
 @click.option("--time-scale", type=float, default=1.0, show_default=True, help="Its seconds per real second.")
 def controller(host: str, model: str, time_scale: float) -> None:
-    """Be a simulated UR controller until interrupted; prints `ready HOST` when it listens."""
+    """Run a simulated UR controller until it is interrupted; prints `ready HOST` when it listens."""
     from hecbench_hardware.controller_sim.server import serve
 
     serve(host, model=model, time_scale=time_scale, announce=click.echo)

@@ -73,7 +73,7 @@ def with_unknowns(specs: Sequence[SolverSpec], unknown: Sequence[str]) -> list[S
         return list(specs)
     if not any(able):
         raise InputError(
-            f"--unknown {unknown[0]}: no solver of these can: name one that has the option `unknown`"
+            f"--unknown {unknown[0]}: none of these solvers can solve for it; name one that has the option `unknown`"
         )
     settings = {"unknown": "+".join(unknown)}
     return [spec.configured(settings) if can else spec for spec, can in zip(specs, able, strict=True)]
