@@ -75,7 +75,7 @@ class CameraModel:
         height: of the image, px.
         K: (3, 3) px, or None when it is still to be calibrated from the images.
         distortion: (0 | 4 | 5 | 8 | 12 | 14,) coefficients in OpenCV's order; none or k1 to k4 of an equidistant lens.
-        distortion_model: "opencv" or "equidistant" (fisheye); see `hecbench.rendering.lens`.
+        distortion_model: "opencv" or "equidistant" (fisheye); see `hecbench.lens`.
     """
 
     width: int

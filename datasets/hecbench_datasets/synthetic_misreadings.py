@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from hecbench import se3
+from hecbench.lens import distort
 from hecbench.recording import EQUIDISTANT, OPENCV, CameraModel, Mounting, Recording
-from hecbench.rendering.lens import distort
 from hecbench.se3 import Array
 from hecbench.targets import ChessboardTarget
 from hecbench_datasets.synthetic_faults import Fault

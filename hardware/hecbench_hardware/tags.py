@@ -1,6 +1,6 @@
 """The pose of an object from its AprilTag: detection, both planar solutions, refinement, covariance, refusals.
 
-Detection: hecbench.apriltags. Planar pose: Collins and Bartoli 2014,
+Detection: hecbench.system.apriltags. Planar pose: Collins and Bartoli 2014,
 "Infinitesimal plane-based pose estimation", both solutions, each refined on every edge between a black and a
 white cell of the tag (tag_edges.py): some hundred edge points instead of four corners.
 """
@@ -12,10 +12,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import apriltags, se3
+from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel
 from hecbench.se3 import Array
+from hecbench.system import apriltags
 from hecbench.targets import AprilTagTarget
 from hecbench_hardware import tag_edges
 from hecbench_hardware.tag_edges import FAMILIES, TagRefused

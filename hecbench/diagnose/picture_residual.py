@@ -20,8 +20,8 @@ from hecbench.diagnose.rivals import (
     judged,
     rivals,
 )
+from hecbench.lens import parameters_of
 from hecbench.recording import EQUIDISTANT, CameraModel
-from hecbench.rendering.lens import parameters_of
 from hecbench.targets import PointsTarget
 
 ID = "picture_residual"

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from hecbench import se3
 from hecbench.bundle.pictures import SharedFit, fit_shared
 from hecbench.diagnose.resolution import BY_SIZE, rescaled
+from hecbench.lens import Sensor, parameters_of, project
 from hecbench.preparation import prepare
 from hecbench.recording import EQUIDISTANT, OPENCV, CameraModel, Recording
-from hecbench.rendering.lens import Sensor, parameters_of, project
 from hecbench.se3 import Array
 from hecbench.targets import grid_shape
 

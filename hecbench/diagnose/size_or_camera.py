@@ -16,7 +16,7 @@ from hecbench.diagnose.calibrate import spread
 from hecbench.diagnose.case import Examination
 from hecbench.diagnose.fit import TYPICAL_NOISE
 from hecbench.errors import SolverFailure
-from hecbench.rendering.lens import Sensor, parameters_of
+from hecbench.lens import Sensor, parameters_of
 from hecbench.se3 import Array
 
 GIVEN, SIZE, FOCAL, CENTRE, BOTH = (

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench.errors import InputError
+from hecbench.lens import distort
 from hecbench.recording import CameraModel
-from hecbench.rendering.lens import distort
 from hecbench.se3 import Array
 
 

@@ -9,11 +9,10 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import se3
+from hecbench import lens, se3
 from hecbench.errors import HecbenchError, InputError
 from hecbench.estimate import Estimate
 from hecbench.recording import Recording
-from hecbench.rendering import lens
 from hecbench.rendering.undistort import Undistortion
 from hecbench.report.overlay import Overlay
 from hecbench.se3 import Array

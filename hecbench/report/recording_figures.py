@@ -11,8 +11,8 @@ import numpy as np
 
 from hecbench import se3
 from hecbench.estimate import Estimate
+from hecbench.lens import project
 from hecbench.recording import Mounting
-from hecbench.rendering.lens import project
 from hecbench.report.svg import DARK, LIGHT, RED, panel, svg
 from hecbench.se3 import Array
 from hecbench.storage.evidence import Evidence

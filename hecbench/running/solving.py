@@ -16,12 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from hecbench import __version__, registry
+from hecbench import __version__, lens, registry
 from hecbench.errors import InputError, InvalidAnswer, Refusal, SolverFailure
 from hecbench.estimate import Estimate, Status, Termination
 from hecbench.preparation import Segmented, prepare, segmented
 from hecbench.recording import Recording
-from hecbench.rendering import lens
 from hecbench.running import isolation
 from hecbench.specs import EvaluatorSpec, Kind, Need, ResultSection, SolverSpec
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hecbench import lens
 from hecbench.estimate import Estimate, Status
 from hecbench.recording import CameraModel, Need
-from hecbench.rendering import lens
 from hecbench.se3 import Array
 from hecbench.verdict.uncertainty import Uncertainty, uncertainty
 from hecbench.workspace import apart_m

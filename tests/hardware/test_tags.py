@@ -6,9 +6,10 @@ import pytest
 from hecbench_hardware import tag_edges, tags
 from hecbench_hardware.tag_edges import TagRefused
 
-from hecbench import apriltags, se3
+from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel
+from hecbench.system import apriltags
 from hecbench.targets import AprilTagTarget
 
 TAG = AprilTagTarget("tag36h11", 0, 0.12)

@@ -15,7 +15,7 @@ STRICT_HEAP = {
 SCRIPT = """
 import sys
 import numpy as np
-from hecbench import apriltags
+from hecbench.system import apriltags
 rng = np.random.default_rng(0)
 for text in sys.argv[2:]:
     width, height = map(int, text.split("x"))

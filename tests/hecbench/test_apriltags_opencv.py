@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from hecbench import apriltags
 from hecbench.errors import InputError
+from hecbench.system import apriltags
 
 NEAR_PX = 0.5
 """The two libraries fit the edges of a tag differently."""

@@ -5,8 +5,7 @@ import numpy as np
 import pytest
 
 from hecbench.errors import InputError
-from hecbench.recording import DISTORTION_LENGTHS, EQUIDISTANT, OPENCV, CameraModel
-from hecbench.rendering.lens import (
+from hecbench.lens import (
     FixedSensor,
     Sensor,
     distort,
@@ -15,6 +14,7 @@ from hecbench.rendering.lens import (
     project,
     undistort,
 )
+from hecbench.recording import DISTORTION_LENGTHS, EQUIDISTANT, OPENCV, CameraModel
 
 K = np.array([[900.0, 0, 640], [0, 920.0, 350], [0, 0, 1]])
 LENSES = [(model, length) for model, lengths in DISTORTION_LENGTHS.items() for length in lengths]

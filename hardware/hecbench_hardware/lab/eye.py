@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
+from hecbench.lens import normalised
 from hecbench.recording import CameraModel
-from hecbench.rendering.lens import normalised
 from hecbench.se3 import Array
 from hecbench_hardware.lab.gl import Canvas
 from hecbench_hardware.lab.scene import Scene

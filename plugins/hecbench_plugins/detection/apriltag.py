@@ -8,9 +8,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import apriltags
 from hecbench.errors import InputError, TargetNotSeen
 from hecbench.se3 import Array
+from hecbench.system import apriltags
 from hecbench.targets import ANY_TAG, AprilTagTarget
 from hecbench_plugins.detection.pictures import each, mirrored
 

@@ -14,9 +14,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import apriltags
 from hecbench.recording import Recording
-from hecbench.system import threads
+from hecbench.system import apriltags, threads
 from hecbench.system.cache import Cache
 
 Grey = NDArray[np.uint8]

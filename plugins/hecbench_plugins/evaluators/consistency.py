@@ -8,9 +8,9 @@ import numpy as np
 
 from hecbench import se3
 from hecbench.estimate import Estimate
+from hecbench.lens import normalised
 from hecbench.recording import CameraModel, Recording
 from hecbench.registry import hookimpl
-from hecbench.rendering.lens import normalised
 from hecbench.se3 import Array
 from hecbench.specs import Column, EvaluatorSpec, Need, ResultSection
 from hecbench_plugins.markers.hand_eye import PosedSamples, carrier_T_target_per_sample, rotation_spread_deg

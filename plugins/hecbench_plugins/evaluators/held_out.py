@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from hecbench import se3, statistics
 from hecbench.estimate import Estimate, Status
+from hecbench.lens import same
 from hecbench.recording import CameraModel, Recording
 from hecbench.registry import hookimpl
-from hecbench.rendering.lens import same
 from hecbench.samples.standstills import standstills
 from hecbench.se3 import Array
 from hecbench.specs import Column, EvaluatorSpec, Need, ResultSection

@@ -8,9 +8,9 @@ import numpy as np
 
 from hecbench import se3
 from hecbench.estimate import Estimate
+from hecbench.lens import normalised, project, same
 from hecbench.recording import Mounting, Recording
 from hecbench.registry import hookimpl
-from hecbench.rendering.lens import normalised, project, same
 from hecbench.se3 import Array
 from hecbench.specs import Column, EvaluatorSpec, ResultSection
 from hecbench.workspace import apart_m, points_in_parent

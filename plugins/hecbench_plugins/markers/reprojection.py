@@ -11,8 +11,8 @@ from hecbench.bundle.adjustment import Solution, adjust
 from hecbench.bundle.model import Noise, Problem, State, linearise, start
 from hecbench.errors import Refusal, SolverFailure
 from hecbench.estimate import Estimate
+from hecbench.lens import FixedSensor, Sensor, parameters_of
 from hecbench.recording import Recording
-from hecbench.rendering.lens import FixedSensor, Sensor, parameters_of
 from hecbench.samples.agreement import LARGEST_SHARE, share_left
 from hecbench.samples.standstills import one_per_robot_pose
 from hecbench.se3 import Array

@@ -10,12 +10,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import se3
+from hecbench import lens, se3
 from hecbench.bundle.pictures import refined
 from hecbench.errors import Refusal
+from hecbench.lens import FixedSensor, normalised
 from hecbench.recording import CameraModel, Recording
-from hecbench.rendering import lens
-from hecbench.rendering.lens import FixedSensor, normalised
 from hecbench.se3 import Array
 from hecbench.targets import Target
 

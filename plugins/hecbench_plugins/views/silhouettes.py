@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.errors import InputError, Refusal
+from hecbench.lens import undistort
 from hecbench.recording import CameraModel, Recording
 from hecbench.rendering import Renderer
-from hecbench.rendering.lens import undistort
 from hecbench.rendering.undistort import shrunk_intrinsics
 from hecbench.se3 import Array
 from hecbench_plugins.views.pyramid import meshes_by_level, photographed_robot

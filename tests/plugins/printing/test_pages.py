@@ -13,8 +13,8 @@ from hecbench_plugins.printing.command import target as verb
 from hecbench_plugins.printing.shapes import pattern
 from PIL import Image
 
-from hecbench import apriltags
 from hecbench.errors import InputError
+from hecbench.system import apriltags
 from hecbench.targets import AprilTagTarget, CharucoTarget, ChessboardTarget, PointsTarget
 
 DPI = 150
