@@ -184,3 +184,20 @@ def test_the_robust_cost_is_continuous_and_its_weights_are_its_slope(limit):
             _huber_cost(np.array([norm + step]), limit) - _huber_cost(np.array([norm - step]), limit)
         ) / (2 * step)
         assert slope == pytest.approx(2 * weight * norm, rel=1e-6)
+
+
+def zooming(points, parameters):
+    """An ideal camera whose focal length is an unknown, in units of 1500 px."""
+    pixels, by_point, _ = IdealCamera(1500.0 * parameters[0])(points, np.zeros(0))
+    return pixels, by_point, (pixels / parameters[0])[..., None]
+
+
+def test_gradient_of_sensor_parameters_with_their_prior(mounting, rng):
+    problem, truth = problem_and_truth(rng, mounting)
+    known = replace(problem, sensor=zooming, parameters=np.array([1.0]), parameter_sigmas=np.array([1e-3]))
+    away = replace(truth, parameters=np.array([1.002]))
+    at, step = linearise(known, away, NOISE), 1e-7
+    ahead, behind = (
+        linearise(known, replace(away, parameters=away.parameters + s), NOISE).cost for s in (step, -step)
+    )
+    assert (ahead - behind) / (2 * step) == pytest.approx(2 * at.gradient_shared[-1], rel=1e-4)
