@@ -5,11 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hecbench_plugins.markers import hand_eye
-from hecbench_plugins.markers.hand_eye import PosedSamples
+from hecbench_plugins.markers.hand_eye import PosedSamples, pose_pairs, translation_given_rotation
 from hecbench_plugins.markers.opencv_hand_eye import without_half_turns
 from scipy.spatial.transform import Rotation
 
 from hecbench import preparation, registry, se3
+from hecbench.conformance import rig
 from hecbench.errors import Refusal
 from hecbench.estimate import Status
 from hecbench.recording import Mounting, Recording
@@ -188,3 +189,11 @@ def test_daniilidis_survives_the_recording_that_breaks_opencv(shared):
     assert estimate.status is Status.OK
     assert estimate.diagnostics["target_spread_deg"] < 0.27  # one sample per robot pose, 61 of 150
     assert estimate.diagnostics["target_spread_mm"] < 3.0
+
+
+@pytest.mark.parametrize("mounting", list(Mounting))
+def test_translation_given_the_true_rotation(rng, mounting):
+    recording = rig(rng, mounting)
+    truth = recording.truth_parent_T_camera
+    found = translation_given_rotation(pose_pairs(recording), truth[:3, :3])
+    np.testing.assert_allclose(found, truth[:3, 3], atol=1e-9)
