@@ -188,6 +188,18 @@ def is_transform(a_T_b: ArrayLike, tolerance: float = 1e-6) -> NDArray[np.bool_]
     return np.asarray(rigid & np.isfinite(a_T_b).all((-1, -2)))
 
 
+def looking(eye_m: ArrayLike, aim_m: ArrayLike) -> Array:
+    """a_T_camera (4, 4) of an upright camera at a point (3,) m of a, whose z is up, that looks at another.
+
+    Neither may stand straight above the other: there "upright" says nothing.
+    """
+    eye_m, aim_m = np.asarray(eye_m, float), np.asarray(aim_m, float)
+    forward = (aim_m - eye_m) / np.linalg.norm(aim_m - eye_m)
+    right = np.cross(forward, [0, 0, 1])
+    right /= np.linalg.norm(right)
+    return make(np.stack([right, np.cross(forward, right), forward], 1), eye_m)
+
+
 def from_rotvec(rotvec: ArrayLike, translation: ArrayLike) -> Array:
     """Transforms of rotation vectors (..., 3) rad and translations (..., 3) m."""
     return make(so3_exp(rotvec), translation)

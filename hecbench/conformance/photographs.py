@@ -26,7 +26,7 @@ def photographs() -> Recording:
     """Four views of a fixed camera: images with a textured background, exact masks, a start, and the truth."""
     rng = np.random.default_rng(0)
     model = cached_robot(ROBOT)
-    base_T_camera = _looking(_EYE_M, _AIM_M)
+    base_T_camera = se3.looking(_EYE_M, _AIM_M)
     joints = _POSE_RAD + rng.uniform(-0.5, 0.5, (_VIEWS, len(_POSE_RAD)))
     assert _CAMERA.K is not None
     renderer = Renderer(RenderMesh.of(model, cell_m=0.002), _CAMERA.K, _CAMERA.width, _CAMERA.height)
@@ -52,13 +52,6 @@ def photographs() -> Recording:
         images=tuple(images),
         masks=tuple(masks),
     )
-
-
-def _looking(eye_m: np.ndarray, aim_m: np.ndarray) -> np.ndarray:
-    forward = (aim_m - eye_m) / np.linalg.norm(aim_m - eye_m)
-    right = np.cross(forward, [0, 0, 1])
-    right /= np.linalg.norm(right)
-    return se3.make(np.stack([right, np.cross(forward, right), forward], 1), eye_m)
 
 
 def _direction(rng: np.random.Generator) -> np.ndarray:

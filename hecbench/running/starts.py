@@ -91,13 +91,9 @@ def _looking(eye_m: Array, text: str, recording: Recording) -> Array:
     aim_m = np.array([0.0, 0.0, _LOOK_M])
     if recording.base_T_flange is not None:
         aim_m = (aim_m + np.nanmean(recording.base_T_flange[:, :3, 3], axis=0)) / 2
-    forward = aim_m - eye_m
-    if np.linalg.norm(forward[:2]) < 1e-3:
+    if np.linalg.norm((aim_m - eye_m)[:2]) < 1e-3:
         raise InputError(f"--init '{text}': is straight above the robot, where upright says nothing; {FORMS}")
-    forward /= np.linalg.norm(forward)
-    right = np.cross(forward, [0, 0, 1])
-    right /= np.linalg.norm(right)
-    return se3.make(np.stack([right, np.cross(forward, right), forward], 1), eye_m)
+    return se3.looking(eye_m, aim_m)
 
 
 def _numbers(words: list[str], text: str) -> Array:
