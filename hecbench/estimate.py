@@ -13,8 +13,9 @@ import msgspec
 import numpy as np
 
 from hecbench import se3
-from hecbench.errors import InputError, InvalidAnswer
-from hecbench.recording import OPENCV, CameraModel, Mounting
+from hecbench.errors import InputError, InvalidAnswer, SolverFailure
+from hecbench.lens import OPENCV, CameraModel
+from hecbench.recording import Mounting
 from hecbench.se3 import Array
 from hecbench.system import files
 
@@ -94,6 +95,17 @@ class Estimate:
                 if pose.shape != (4, 4) or not se3.is_transform(pose):
                     raise InvalidAnswer(f"estimate: {name} is not a rigid transform (4x4, metres)")
                 object.__setattr__(self, name, pose)
+
+    @property
+    def pose(self) -> Array:
+        """parent_T_camera (4, 4) m of an estimate that is ok.
+
+        Raises:
+            SolverFailure: there is no answer.
+        """
+        if self.parent_T_camera is None:
+            raise SolverFailure(f"'{self.solver}' has no answer: {self.reason}")
+        return self.parent_T_camera
 
     def to_json(self) -> dict[str, Any]:
         """JSON values in the order of the schema; `suite`, `item` and `level` only when set."""

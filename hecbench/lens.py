@@ -1,4 +1,4 @@
-"""Lens models: ideal normalised coordinates to those of the picture and back, and projection with derivatives.
+"""Cameras and their lens models: ideal normalised coordinates to those of the picture and back, and projection.
 
 `opencv` is OpenCV's rational, tangential, thin-prism and tilted model (OpenCV documentation, "Camera Calibration and
 3D Reconstruction"). `equidistant` is the model of fisheye lenses of Kannala and Brandt 2006, "A generic camera model
@@ -7,18 +7,90 @@ and calibration method", eq. 6, as OpenCV's fisheye module, ROS and Kalibr write
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from dataclasses import dataclass, field
 
-from hecbench.recording import EQUIDISTANT, CameraModel
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hecbench.errors import InputError, Refusal
 from hecbench.se3 import Array
 
+OPENCV, EQUIDISTANT = "opencv", "equidistant"
+DISTORTION_LENGTHS = {OPENCV: (0, 4, 5, 8, 12, 14), EQUIDISTANT: (0, 4)}
+"""Numbers of coefficients of each lens model."""
 _STEP = 1e-20
 """Of the complex-step derivatives (Squire and Trapp 1998), which are exact to rounding for any small step."""
 _ROUNDS = 30
 _CONVERGED = 1e-12
 _UNDISTORTED = 1e-7
 """Residual, normalised: a ten-thousandth of a pixel."""
+
+
+def finite(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
+    """The value as an array of that shape; `name` is for the error."""
+    array = np.asarray(value, float)
+    if array.shape != shape or not np.isfinite(array).all():
+        raise InputError(
+            f"{name}: expected {'x'.join(map(str, shape))} finite numbers, found shape {array.shape}"
+        )
+    return array
+
+
+@dataclass(frozen=True, eq=False)
+class CameraModel:
+    """A pinhole camera in OpenCV's convention: pixel centres at integers, x right, y down, z forward.
+
+    Attributes:
+        width: of the image, px.
+        height: of the image, px.
+        K: (3, 3) px, or None when it is still to be calibrated from the images.
+        distortion: (0 | 4 | 5 | 8 | 12 | 14,) coefficients in OpenCV's order; none or k1 to k4 of an equidistant lens.
+        distortion_model: "opencv" or "equidistant" (fisheye); see `hecbench.lens`.
+    """
+
+    width: int
+    height: int
+    K: Array | None = None
+    distortion: Array = field(default_factory=lambda: np.zeros(0))
+    distortion_model: str = OPENCV
+
+    def __post_init__(self) -> None:
+        if self.width < 1 or self.height < 1:
+            raise InputError(
+                f"camera: size {self.width}x{self.height} is not positive; give the image's size in px"
+            )
+        if self.K is not None:
+            K = finite("camera.K", self.K, (3, 3))
+            if K[0, 0] <= 0 or K[1, 1] <= 0 or K[1, 0] or (K[2] != [0, 0, 1]).any():
+                raise InputError("camera.K: expected [[fx, s, cx], [0, fy, cy], [0, 0, 1]] with fx, fy > 0")
+            if np.array_equal(K, np.eye(3)):
+                raise InputError("camera.K: is the identity; give the intrinsics in px, or null if unknown")
+            object.__setattr__(self, "K", K)
+        distortion = np.asarray(self.distortion, float).reshape(-1)
+        if self.distortion_model not in DISTORTION_LENGTHS:
+            raise InputError(
+                f"camera.distortion_model: '{self.distortion_model}' is not one of {', '.join(DISTORTION_LENGTHS)}"
+            )
+        lengths = DISTORTION_LENGTHS[self.distortion_model]
+        if len(distortion) not in lengths or not np.isfinite(distortion).all():
+            raise InputError(f"camera.distortion: {len(distortion)} numbers; give {lengths} finite ones")
+        object.__setattr__(self, "distortion", distortion)
+
+    @property
+    def intrinsics(self) -> Array:
+        """K (3, 3) px.
+
+        Raises:
+            Refusal: it is not known.
+        """
+        if self.K is None:
+            raise Refusal("the camera's K is not known; give it, or `--refit-intrinsics`")
+        return self.K
+
+    @property
+    def is_pinhole(self) -> bool:
+        """Whether the lens bends no ray."""
+        return self.distortion_model == OPENCV and not self.distortion.any()
 
 
 def distort(points: Array, camera: CameraModel) -> Array:
@@ -81,17 +153,15 @@ def _by_point(points: Array, coefficients: Array, model: str) -> Array:
 
 def normalised(camera: CameraModel, pixels: Array) -> Array:
     """Ideal normalised coordinates (..., 2) of pixels (..., 2), NaN kept; the camera's K must be known."""
-    assert camera.K is not None
-    centred = (pixels - camera.K[:2, 2]) @ np.linalg.inv(camera.K[:2, :2]).T
+    centred = (pixels - camera.intrinsics[:2, 2]) @ np.linalg.inv(camera.intrinsics[:2, :2]).T
     return undistort(centred, camera)
 
 
 def project(camera: CameraModel, points_c: Array) -> Array:
     """Pixels (..., 2) of points (..., 3) m in the camera's frame; NaN behind the camera. K must be known."""
-    assert camera.K is not None
     ahead = points_c[..., 2:] > 0
     ideal = np.where(ahead, points_c[..., :2] / np.where(ahead, points_c[..., 2:], 1.0), np.nan)
-    return np.asarray(distort(ideal, camera) @ camera.K[:2, :2].T + camera.K[:2, 2])
+    return np.asarray(distort(ideal, camera) @ camera.intrinsics[:2, :2].T + camera.intrinsics[:2, 2])
 
 
 def same(camera: CameraModel, other: CameraModel) -> bool:
@@ -104,8 +174,7 @@ def same(camera: CameraModel, other: CameraModel) -> bool:
 
 def parameters_of(camera: CameraModel) -> Array:
     """[fx, fy, cx, cy, distortion...] of a camera whose K is known."""
-    assert camera.K is not None
-    K = camera.K
+    K = camera.intrinsics
     return np.array([K[0, 0], K[1, 1], K[0, 2], K[1, 2], *camera.distortion])
 
 

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
 from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.errors import InputError, Refusal
+from hecbench.lens import OPENCV, finite
+from hecbench.lens import CameraModel as CameraModel
 from hecbench.se3 import Array
 from hecbench.system import pictures
 from hecbench.targets import Target
@@ -24,9 +26,6 @@ _Value = TypeVar("_Value", np.uint8, np.bool_)
 ImageSource = Path | Image | None
 """A file that is decoded when asked for, an array in memory, or nothing for this sample."""
 
-OPENCV, EQUIDISTANT = "opencv", "equidistant"
-DISTORTION_LENGTHS = {OPENCV: (0, 4, 5, 8, 12, 14), EQUIDISTANT: (0, 4)}
-"""Numbers of coefficients of each lens model."""
 _ROTATION_TOLERANCE = 1e-3
 
 
@@ -64,52 +63,6 @@ class RobotDescription:
     def source(self) -> str | Path | None:
         """What `load_robot` takes: the URDF where there is one, or the name; None when neither is known."""
         return self.urdf or self.model
-
-
-@dataclass(frozen=True, eq=False)
-class CameraModel:
-    """A pinhole camera in OpenCV's convention: pixel centres at integers, x right, y down, z forward.
-
-    Attributes:
-        width: of the image, px.
-        height: of the image, px.
-        K: (3, 3) px, or None when it is still to be calibrated from the images.
-        distortion: (0 | 4 | 5 | 8 | 12 | 14,) coefficients in OpenCV's order; none or k1 to k4 of an equidistant lens.
-        distortion_model: "opencv" or "equidistant" (fisheye); see `hecbench.lens`.
-    """
-
-    width: int
-    height: int
-    K: Array | None = None
-    distortion: Array = field(default_factory=lambda: np.zeros(0))
-    distortion_model: str = OPENCV
-
-    def __post_init__(self) -> None:
-        if self.width < 1 or self.height < 1:
-            raise InputError(
-                f"camera: size {self.width}x{self.height} is not positive; give the image's size in px"
-            )
-        if self.K is not None:
-            K = _finite("camera.K", self.K, (3, 3))
-            if K[0, 0] <= 0 or K[1, 1] <= 0 or K[1, 0] or (K[2] != [0, 0, 1]).any():
-                raise InputError("camera.K: expected [[fx, s, cx], [0, fy, cy], [0, 0, 1]] with fx, fy > 0")
-            if np.array_equal(K, np.eye(3)):
-                raise InputError("camera.K: is the identity; give the intrinsics in px, or null if unknown")
-            object.__setattr__(self, "K", K)
-        distortion = np.asarray(self.distortion, float).reshape(-1)
-        if self.distortion_model not in DISTORTION_LENGTHS:
-            raise InputError(
-                f"camera.distortion_model: '{self.distortion_model}' is not one of {', '.join(DISTORTION_LENGTHS)}"
-            )
-        lengths = DISTORTION_LENGTHS[self.distortion_model]
-        if len(distortion) not in lengths or not np.isfinite(distortion).all():
-            raise InputError(f"camera.distortion: {len(distortion)} numbers; give {lengths} finite ones")
-        object.__setattr__(self, "distortion", distortion)
-
-    @property
-    def is_pinhole(self) -> bool:
-        """Whether the lens bends no ray."""
-        return self.distortion_model == OPENCV and not self.distortion.any()
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -162,7 +115,7 @@ class Recording:
             raise InputError("samples: two have the same id; make the ids unique")
         for name in ("initial_parent_T_camera", "truth_parent_T_camera"):
             if (pose := getattr(self, name)) is not None:
-                self._put(name, _rigid(_finite(name, pose, (4, 4))[None], name)[0])
+                self._put(name, _rigid(finite(name, pose, (4, 4))[None], name)[0])
         for name in ("base_T_flange", "camera_T_target"):
             if (poses := self._per_sample(name, (4, 4))) is not None:
                 self._put(name, _rigid(poses, f"samples[{{}}].{name}"))
@@ -249,6 +202,11 @@ class Recording:
             self.base_T_flange if self.mounting is Mounting.EYE_TO_HAND else se3.inverse(self.base_T_flange)
         )
 
+    @property
+    def present(self) -> Present:
+        """Its fields as values that are never None: ``recording.present.camera``."""
+        return Present(self)
+
     def offers(self) -> frozenset[Need]:
         """What this recording has of the things that solvers ask for."""
         has_intrinsics = self.camera is not None and self.camera.K is not None
@@ -326,6 +284,33 @@ class Recording:
         return digest.hexdigest()
 
 
+class Present:
+    """The fields of a recording as values that are never None; one that is absent raises a `Refusal` with its name."""
+
+    robot: RobotDescription
+    camera: CameraModel
+    target: Target
+    initial_parent_T_camera: Array
+    truth_parent_T_camera: Array
+    base_T_flange: Array
+    joints_rad: Array
+    camera_T_target: Array
+    corners_px: Array
+    images: tuple[ImageSource, ...]
+    masks: tuple[ImageSource, ...]
+    folder: Path
+
+    def __init__(self, recording: Recording) -> None:
+        self._recording = recording
+
+    def __getattr__(self, name: str) -> Any:
+        if name not in Present.__annotations__:
+            raise AttributeError(name)
+        if (value := getattr(self._recording, name)) is None:
+            raise Refusal(f"recording '{self._recording.name}' has no {name}")
+        return value
+
+
 _PER_SAMPLE_ARRAYS = (
     "base_T_flange",
     "joints_rad",
@@ -334,15 +319,6 @@ _PER_SAMPLE_ARRAYS = (
     "robot_stamp_s",
     "camera_stamp_s",
 )
-
-
-def _finite(name: str, value: ArrayLike, shape: tuple[int, ...]) -> Array:
-    array = np.asarray(value, float)
-    if array.shape != shape or not np.isfinite(array).all():
-        raise InputError(
-            f"{name}: expected {'x'.join(map(str, shape))} finite numbers, found shape {array.shape}"
-        )
-    return array
 
 
 def _rigid(poses: Array, name: str) -> Array:

@@ -134,8 +134,7 @@ def make(level: str, index: int, seed: int) -> Recording:
 
     truth = scene(level, index, seed)
     model, mesh = robot_and_mesh()
-    assert truth.camera.K is not None
-    renderer = Renderer(mesh, truth.camera.K, WIDTH, HEIGHT)
+    renderer = Renderer(mesh, truth.camera.intrinsics, WIDTH, HEIGHT)
     images, masks = [], []
     for base_T_link in model.link_poses(truth.joints_rad, frame=BASE):
         renderer.draw(truth.camera_T_base @ base_T_link)

@@ -79,8 +79,7 @@ def make(suite: str, level: str, index: int, seed: int) -> Recording:
 def _off(
     recording: Recording, distance_m: float, turn_deg: float, rng: np.random.Generator
 ) -> NDArray[np.float64]:
-    truth = recording.truth_parent_T_camera
-    assert truth is not None
+    truth = recording.present.truth_parent_T_camera
     shift, axis = rng.normal(size=(2, 3))
     turn = np.deg2rad(turn_deg) * axis / np.linalg.norm(axis)
     moved = truth[:3, 3] + distance_m * shift / np.linalg.norm(shift)
@@ -88,10 +87,8 @@ def _off(
 
 
 def _trapped(recording: Recording, level: str, rows: NDArray[np.int64]) -> Recording:
-    robot, joints, images = recording.robot, recording.joints_rad, recording.images
-    assert robot is not None
-    assert joints is not None
-    assert images is not None
+    present = recording.present
+    robot, joints, images = present.robot, present.joints_rad, present.images
     if level == "wrong_robot":
         return replace(
             recording, robot=replace(robot, model=_OTHER_ROBOT[str(robot.model)]), base_T_flange=None
@@ -101,8 +98,7 @@ def _trapped(recording: Recording, level: str, rows: NDArray[np.int64]) -> Recor
     if level == "two_cameras":
         half = len(recording) // 2
         if recording.folder is not None and recording.folder.name == REAL:
-            other = recording_io.load(recording.folder.parent / OTHER_CAMERA).images
-            assert other is not None
+            other = recording_io.load(recording.folder.parent / OTHER_CAMERA).present.images
             strangers = tuple(other[row] for row in rows[:half])
         else:
             strangers = tuple(np.ascontiguousarray(recording.image(i)[::-1, ::-1]) for i in range(half))

@@ -166,8 +166,7 @@ def make(level: str, index: int, seed: int) -> Recording:
     images, masks = [], []
     for base_T_link in model.link_poses(truth.joints_rad, frame=BASE):
         drawn = mesh if level not in MISMATCH else mesh.scaled(base_T_link, truth.scale)
-        assert truth.camera.K is not None
-        renderer = Renderer(drawn, truth.camera.K, WIDTH, HEIGHT)
+        renderer = Renderer(drawn, truth.camera.intrinsics, WIDTH, HEIGHT)
         renderer.draw(truth.camera_T_base @ base_T_link)
         picture = change(renderer.image(colours).copy(), rng)
         images.append(np.round(255 * np.clip(picture[..., :3], 0, 1)).astype(np.uint8))
@@ -202,8 +201,7 @@ def correspondence_floor_mm(level: str, index: int, seed: int) -> float:
     truth = scene(level, index, seed)
     model, mesh = robot_and_mesh()
     base_T_link = model.link_poses(truth.joints_rad, frame=BASE)[0]
-    K = truth.camera.K
-    assert K is not None
+    K = truth.camera.intrinsics
     renderer = Renderer(mesh.scaled(base_T_link, truth.scale), K, WIDTH, HEIGHT)
     renderer.draw(truth.camera_T_base @ base_T_link)
     v, u = np.nonzero(renderer.face >= 0)

@@ -60,20 +60,17 @@ def arm_recording(robot: RobotModel, rng: np.random.Generator, samples: int = 12
 
 def _corners(recording: Recording, camera_T_target: Array, rng: np.random.Generator) -> Array:
     """(N, P, 2) px with noise; NaN outside the image or behind the camera."""
-    assert recording.target is not None
-    assert recording.camera is not None
-    assert recording.camera.K is not None
-    points = se3.transform_points(camera_T_target, recording.target.points_m)
-    pixels = points @ recording.camera.K.T
+    present = recording.present
+    points = se3.transform_points(camera_T_target, present.target.points_m)
+    pixels = points @ present.camera.intrinsics.T
     pixels = pixels[..., :2] / pixels[..., 2:] + rng.normal(0.0, _PIXEL_NOISE_PX, pixels[..., :2].shape)
-    size = [recording.camera.width, recording.camera.height]
+    size = [present.camera.width, present.camera.height]
     unseen = (points[..., 2] <= 0) | ((pixels < 0) | (pixels > size)).any(-1)
     return np.where(unseen[..., None], np.nan, pixels)
 
 
 def _poses(recording: Recording) -> Array:
-    assert recording.base_T_flange is not None
-    return recording.base_T_flange.copy()
+    return recording.present.base_T_flange.copy()
 
 
 def inverted_poses(recording: Recording, rng: np.random.Generator) -> Recording:
@@ -131,8 +128,7 @@ def _replaced_rotations(recording: Recording, rotvecs: Array, rng: np.random.Gen
     """A new rig with the same camera and target, whose target turns by these rotation vectors (N, 3) rad."""
     from scipy.spatial.transform import Rotation
 
-    X, hand_noise = recording.truth_parent_T_camera, (len(recording), 3)
-    assert X is not None
+    X, hand_noise = recording.present.truth_parent_T_camera, (len(recording), 3)
     positions = rng.uniform([-0.2, -0.2, 1.8], [0.2, 0.2, 2.2], hand_noise)
     camera_T_target = se3.from_rotvec(rotvecs, positions)
     carrier_T_target = se3.make(Rotation.random(random_state=rng).as_matrix(), [0.0, 0.0, 0.05])
@@ -158,10 +154,8 @@ def exchanged(recording: Recording, rng: np.random.Generator) -> Recording:
 
 def other_resolution(recording: Recording, rng: np.random.Generator) -> Recording:
     """Intrinsics of images half, two thirds, one and a half times or twice as large."""
-    camera = recording.camera
-    assert camera is not None
-    assert camera.K is not None
-    K = camera.K.copy()
+    camera = recording.present.camera
+    K = camera.intrinsics.copy()
     K[:2] *= rng.choice([0.5, 2 / 3, 1.5, 2.0])
     return replace(recording, camera=replace(camera, K=K))
 
@@ -204,8 +198,7 @@ def mirrored_target_poses(recording: Recording, rng: np.random.Generator) -> Rec
     """Only target poses, of which some are the mirror image that a planar target allows; needs corners given."""
     from scipy.spatial.transform import Rotation
 
-    assert recording.camera_T_target is not None
-    poses = recording.camera_T_target.copy()
+    poses = recording.present.camera_T_target.copy()
     chosen = rng.choice(len(poses), max(1, round(_FLIPPED_SHARE * len(poses))), replace=False)
     for i in chosen:
         sight = poses[i, :3, 3] / np.linalg.norm(poses[i, :3, 3])

@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from hecbench import se3
-from hecbench.lens import distort
-from hecbench.recording import EQUIDISTANT, OPENCV, CameraModel, Mounting, Recording
+from hecbench.lens import EQUIDISTANT, OPENCV, CameraModel, distort
+from hecbench.recording import Mounting, Recording
 from hecbench.se3 import Array
 from hecbench.targets import ChessboardTarget
 from hecbench_datasets.synthetic_faults import Fault
@@ -44,12 +44,9 @@ def _webcam(rng: np.random.Generator) -> Array:
 
 def _bent(recording: Recording, distortion: Array, model: str = OPENCV) -> Recording:
     """The recording as a lens of these coefficients shows it, with the lens declared."""
-    camera, corners = recording.camera, recording.corners_px
-    assert camera is not None
-    assert camera.K is not None
-    assert corners is not None
+    camera, corners = recording.present.camera, recording.present.corners_px
     lens = replace(camera, distortion=distortion, distortion_model=model)
-    focal, centre = np.diag(camera.K)[:2], camera.K[:2, 2]
+    focal, centre = np.diag(camera.intrinsics)[:2], camera.intrinsics[:2, 2]
     return replace(
         recording, camera=lens, corners_px=distort((corners - centre) / focal, lens) * focal + centre
     )
@@ -85,10 +82,8 @@ def coefficients_reordered(recording: Recording, rng: np.random.Generator) -> Re
 
 def squares_not_square(recording: Recording, rng: np.random.Generator) -> Recording:
     """A board whose printer scaled one direction: the corners are those of the true one, seen with its own pitch."""
-    corners, target, camera = recording.corners_px, recording.target, recording.camera
-    assert corners is not None
+    corners, target, camera = recording.present.corners_px, recording.target, recording.present.camera
     assert isinstance(target, ChessboardTarget)
-    assert camera is not None
     pitch = rng.choice([0.97, 0.98, 1.02, 1.03])
     grid = corners.reshape(len(corners), target.rows, target.columns, 2)
     stretched = _stretched(grid, float(pitch)).reshape(corners.shape)
@@ -116,18 +111,15 @@ def _stretched(grid: Array, pitch: float) -> Array:
 
 def transposed(recording: Recording, rng: np.random.Generator) -> Recording:
     """Corners listed column by column."""
-    assert recording.corners_px is not None
     assert isinstance(recording.target, ChessboardTarget)
     columns, rows = recording.target.columns, recording.target.rows
     order = np.arange(columns * rows).reshape(rows, columns).T.ravel()
-    return replace(recording, corners_px=recording.corners_px[:, order])
+    return replace(recording, corners_px=recording.present.corners_px[:, order])
 
 
 def other_focal_length(recording: Recording, rng: np.random.Generator) -> Recording:
     """The matrix of the raw pictures for rectified ones: 5 to 10 % longer, and some pixels off."""
-    assert recording.camera is not None
-    assert recording.camera.K is not None
-    K = recording.camera.K.copy()
+    K = recording.present.camera.intrinsics.copy()
     K[[0, 1], [0, 1]] *= rng.uniform(1.05, 1.1) * np.array([1.0, rng.uniform(0.995, 1.005)])
     K[:2, 2] += rng.uniform(-10, 10, 2)
     return _with_camera(recording, K=K)
@@ -135,48 +127,41 @@ def other_focal_length(recording: Recording, rng: np.random.Generator) -> Record
 
 def cropped(recording: Recording, rng: np.random.Generator) -> Recording:
     """The principal point of the whole picture for a cropped one: off by 100 px or more."""
-    assert recording.camera is not None
-    assert recording.camera.K is not None
-    K = recording.camera.K.copy()
+    K = recording.present.camera.intrinsics.copy()
     K[:2, 2] += rng.choice([-1.0, 1.0], 2) * rng.uniform([100.0, 50.0], [150.0, 90.0])
     return _with_camera(recording, K=K)
 
 
 def frozen_target(recording: Recording, rng: np.random.Generator) -> Recording:
     """The target's corners stay what they were from the middle on."""
-    assert recording.corners_px is not None
-    corners = recording.corners_px.copy()
+    corners = recording.present.corners_px.copy()
     corners[len(corners) // 2 :] = corners[len(corners) // 2]
     return replace(recording, corners_px=corners)
 
 
 def frozen_robot(recording: Recording, rng: np.random.Generator) -> Recording:
     """The robot's pose stays what it was for the last third."""
-    assert recording.base_T_flange is not None
-    poses = recording.base_T_flange.copy()
+    poses = recording.present.base_T_flange.copy()
     poses[-len(poses) // 3 :] = poses[-len(poses) // 3]
     return replace(recording, base_T_flange=poses)
 
 
 def rows_missed(recording: Recording, rng: np.random.Generator) -> Recording:
     """Two robot poses in the middle were not written: from there on each belongs to the image two rows later."""
-    assert recording.base_T_flange is not None
     first = len(recording) // 2 + int(rng.integers(0, 3))
-    poses = recording.base_T_flange
+    poses = recording.present.base_T_flange
     kept = recording.subset(range(len(recording) - 2))
     return replace(kept, base_T_flange=np.concatenate([poses[:first], poses[first + 2 :]]))
 
 
 def text_order(recording: Recording, rng: np.random.Generator) -> Recording:
     """Robot poses sorted by name as text, images by number."""
-    assert recording.base_T_flange is not None
     order = sorted(range(len(recording)), key=str)
-    return replace(recording, base_T_flange=recording.base_T_flange[order])
+    return replace(recording, base_T_flange=recording.present.base_T_flange[order])
 
 
 def _rotations_replaced(recording: Recording, rotations: Array) -> Recording:
-    assert recording.base_T_flange is not None
-    poses = recording.base_T_flange.copy()
+    poses = recording.present.base_T_flange.copy()
     poses[:, :3, :3] = rotations
     return replace(recording, base_T_flange=poses)
 
@@ -185,8 +170,7 @@ def vectors_as_angles(recording: Recording, rng: np.random.Generator) -> Recordi
     """Rotation vectors taken for roll pitch yaw."""
     from scipy.spatial.transform import Rotation
 
-    assert recording.base_T_flange is not None
-    vectors = se3.so3_log(recording.base_T_flange[:, :3, :3])
+    vectors = se3.so3_log(recording.present.base_T_flange[:, :3, :3])
     return _rotations_replaced(recording, Rotation.from_euler("xyz", vectors).as_matrix())
 
 
@@ -194,16 +178,13 @@ def quaternions_shifted(recording: Recording, rng: np.random.Generator) -> Recor
     """w x y z taken for x y z w."""
     from scipy.spatial.transform import Rotation
 
-    assert recording.base_T_flange is not None
-    quaternions = Rotation.from_matrix(recording.base_T_flange[:, :3, :3]).as_quat()
+    quaternions = Rotation.from_matrix(recording.present.base_T_flange[:, :3, :3]).as_quat()
     return _rotations_replaced(recording, Rotation.from_quat(quaternions[:, [3, 0, 1, 2]]).as_matrix())
 
 
 def mirrored(recording: Recording, rng: np.random.Generator) -> Recording:
     """Pictures flipped left to right."""
-    assert recording.corners_px is not None
-    assert recording.camera is not None
-    flipped = recording.corners_px * [-1.0, 1.0] + [recording.camera.width - 1.0, 0.0]
+    flipped = recording.present.corners_px * [-1.0, 1.0] + [recording.present.camera.width - 1.0, 0.0]
     return replace(recording, corners_px=flipped)
 
 

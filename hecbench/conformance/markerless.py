@@ -30,11 +30,9 @@ def right(solver: Solver) -> Iterator[str]:
     if isinstance(found, str):
         yield f"four exact pictures with masks and a near start are refused: {found}"
         return
-    truth = recording.truth_parent_T_camera
-    assert found.parent_T_camera is not None
-    assert truth is not None
-    off_m = float(se3.translation_error_m(found.parent_T_camera, truth))
-    off_rad = float(se3.rotation_error_rad(found.parent_T_camera, truth))
+    truth = recording.present.truth_parent_T_camera
+    off_m = float(se3.translation_error_m(found.pose, truth))
+    off_rad = float(se3.rotation_error_rad(found.pose, truth))
     if off_m > TOLERANCE_M or off_rad > TOLERANCE_RAD:
         yield f"exact pictures: off by {1e3 * off_m:.0f} mm and {np.rad2deg(off_rad):.1f} deg"
 
@@ -61,7 +59,6 @@ def blind(solver: Solver) -> Iterator[str]:
 def refuses_an_empty_scene(solver: Solver) -> Iterator[str]:
     """Pictures without a robot give no answer."""
     recording = photographs()
-    assert recording.images is not None
     wall = np.full_like(np.asarray(recording.image(0)), 128)
     nothing = np.zeros(wall.shape[:2], np.uint8)
     empty = replace(recording, images=(wall,) * len(recording), masks=(nothing,) * len(recording))

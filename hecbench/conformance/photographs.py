@@ -28,8 +28,7 @@ def photographs() -> Recording:
     model = cached_robot(ROBOT)
     base_T_camera = se3.looking(_EYE_M, _AIM_M)
     joints = _POSE_RAD + rng.uniform(-0.5, 0.5, (_VIEWS, len(_POSE_RAD)))
-    assert _CAMERA.K is not None
-    renderer = Renderer(RenderMesh.of(model, cell_m=0.002), _CAMERA.K, _CAMERA.width, _CAMERA.height)
+    renderer = Renderer(RenderMesh.of(model, cell_m=0.002), _CAMERA.intrinsics, _CAMERA.width, _CAMERA.height)
     wall = np.repeat(np.repeat(rng.uniform(0.2, 0.8, (24, 32, 3)), 10, 0), 10, 1)
     images, masks = [], []
     for base_T_link in model.link_poses(joints, frame="base"):

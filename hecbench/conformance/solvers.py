@@ -124,8 +124,7 @@ def _same_on(
                         reason = before if isinstance(before, str) else after
                         yield f"{mounting}, rig {seed}: answered once, refused once: {reason}"
                     continue
-                assert after.parent_T_camera is not None
-                error = difference(undo(after.parent_T_camera), before.parent_T_camera)
+                error = difference(undo(after.pose), before.parent_T_camera)
                 if not error <= tolerance:
                     yield f"{mounting}, rig {seed}: the answers differ by {error:.3g} m or rad"
 
@@ -141,8 +140,7 @@ _MOVE = se3.from_rotvec([0.3, -0.5, 0.7], [0.4, -0.2, 0.6])
 
 def _moved_parent(recording: Recording) -> Recording:
     """The same rig described in another parent frame."""
-    base_T_flange = recording.base_T_flange
-    assert base_T_flange is not None
+    base_T_flange = recording.present.base_T_flange
     eye_to_hand = recording.mounting is Mounting.EYE_TO_HAND
     start = recording.initial_parent_T_camera
     return replace(
@@ -165,8 +163,7 @@ def _other_truth_ids_and_paths(recording: Recording) -> Recording:
 
 def _moved_other(recording: Recording) -> Recording:
     """The same rig with the frame between hand and target described differently; X stays."""
-    base_T_flange = recording.base_T_flange
-    assert base_T_flange is not None
+    base_T_flange = recording.present.base_T_flange
     eye_to_hand = recording.mounting is Mounting.EYE_TO_HAND
     return replace(recording, base_T_flange=base_T_flange @ _MOVE if eye_to_hand else _MOVE @ base_T_flange)
 

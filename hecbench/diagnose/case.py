@@ -84,15 +84,13 @@ class Examination:
     @property
     def base_T_flange(self) -> Array:
         """(N, 4, 4) m of the usable samples."""
-        poses = self.observed.base_T_flange
-        assert poses is not None
+        poses = self.observed.present.base_T_flange
         return poses[self.usable]
 
     @property
     def camera_T_target(self) -> Array:
         """(N, 4, 4) m of the usable samples, for a target of the true size, seen by an optical camera."""
-        poses = self.observed.camera_T_target
-        assert poses is not None
+        poses = self.observed.present.camera_T_target
         poses = poses[self.usable]
         poses[:, :3, 3] *= self.size_factor
         return np.asarray(self.optical_T_camera @ poses)

@@ -105,8 +105,7 @@ def _rescaled_fits(case: Examination, camera: CameraModel) -> Iterator[tuple[flo
     for ratio, rescaled_camera in rescaled(camera):
         other = replace(case, recording=replace(case.recording, camera=rescaled_camera))
         if other.fit is not None:
-            assert rescaled_camera.K is not None
-            yield _angle(other.fit, rescaled_camera.K[0, 0]), ratio, other.fit
+            yield _angle(other.fit, rescaled_camera.intrinsics[0, 0]), ratio, other.fit
 
 
 def _angle(fit: Fit | None, focal_px: float) -> float:

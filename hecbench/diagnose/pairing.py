@@ -133,7 +133,6 @@ def _exchanged(case: Examination) -> list[tuple[int, int]]:
 def _repaired(case: Examination, target: NDArray[np.int64], robot: NDArray[np.int64]) -> Examination:
     """The case in which images `target` have the robot poses `robot`, both indices of usable samples."""
     observed = case.observed
-    assert observed.base_T_flange is not None
-    poses = observed.base_T_flange[case.usable[robot]]
+    poses = observed.present.base_T_flange[case.usable[robot]]
     kept = replace(case.recording.subset(case.usable[target]), base_T_flange=poses, joints_rad=None)
     return replace(case, recording=kept)

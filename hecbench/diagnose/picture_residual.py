@@ -20,8 +20,7 @@ from hecbench.diagnose.rivals import (
     judged,
     rivals,
 )
-from hecbench.lens import parameters_of
-from hecbench.recording import EQUIDISTANT, CameraModel
+from hecbench.lens import EQUIDISTANT, CameraModel, parameters_of
 from hecbench.targets import PointsTarget
 
 ID = "picture_residual"
@@ -69,8 +68,7 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
 
 def _unexplained(case: Examination, given: Judged) -> tuple[Finding, Examination]:
     """No reading is better: fine, unless the corners are far from any board."""
-    corners = given.rival.recording.corners_px
-    assert corners is not None
+    corners = given.rival.recording.present.corners_px
     size_px = float(
         np.median(np.linalg.norm(np.nanmax(corners, axis=1) - np.nanmin(corners, axis=1), axis=1))
     )
@@ -118,8 +116,7 @@ def _named(
 def _described(result: Judged, case: Examination) -> tuple[str, str]:
     """The fault with its numbers, and its cure."""
     rival, fit = result.rival, result.fit
-    given = case.recording.camera
-    assert given is not None
+    given = case.recording.present.camera
     camera = _camera(result)
     if rival.cause == BOARD:
         change = 100 * (fit.pitch - 1)
@@ -158,8 +155,7 @@ def _matrix_values(camera: CameraModel) -> str:
 
 
 def _camera(result: Judged) -> CameraModel:
-    camera = result.rival.recording.camera
-    assert camera is not None
+    camera = result.rival.recording.present.camera
     fx, fy, cx, cy = result.fit.parameters[:4]
     K = np.array([[fx, 0.0, cx], [0.0, fy, cy], [0.0, 0.0, 1.0]])
     return replace(camera, K=K, distortion=result.fit.parameters[4:])
@@ -169,11 +165,9 @@ def _cured(case: Examination, best: Judged) -> Examination:
     """The case with the camera, board or order of corners that fits."""
     recording = replace(case.recording, camera=_camera(best))
     if best.rival.cause == BOARD:
-        assert recording.target is not None
         recording = replace(
-            recording, target=PointsTarget.of(recording.target.points_m * [1.0, best.fit.pitch, 1.0])
+            recording, target=PointsTarget.of(recording.present.target.points_m * [1.0, best.fit.pitch, 1.0])
         )
     if best.rival.order is not None:
-        assert recording.corners_px is not None
-        recording = replace(recording, corners_px=recording.corners_px[:, best.rival.order])
+        recording = replace(recording, corners_px=recording.present.corners_px[:, best.rival.order])
     return replace(case, recording=recording, noise_px=best.noise_px)

@@ -24,13 +24,11 @@ def rescaled(camera: CameraModel) -> Iterator[tuple[float, CameraModel]]:
 
 def scaled(camera: CameraModel, ratio: float) -> CameraModel:
     """The camera with fx, fy, cx and cy times a ratio."""
-    assert camera.K is not None
-    K = camera.K.copy()
+    K = camera.intrinsics.copy()
     K[:2] *= ratio
     return replace(camera, K=K)
 
 
 def off_centre(camera: CameraModel) -> float:
     """How far the principal point is from the image's centre, over the image's size."""
-    assert camera.K is not None
-    return float(np.abs(camera.K[:2, 2] / [camera.width, camera.height] - 0.5).max())
+    return float(np.abs(camera.intrinsics[:2, 2] / [camera.width, camera.height] - 0.5).max())

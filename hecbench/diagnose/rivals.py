@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from hecbench import se3
 from hecbench.bundle.pictures import SharedFit, fit_shared
 from hecbench.diagnose.resolution import BY_SIZE, rescaled
-from hecbench.lens import Sensor, parameters_of, project
+from hecbench.lens import EQUIDISTANT, OPENCV, CameraModel, Sensor, parameters_of, project
 from hecbench.preparation import prepare
-from hecbench.recording import EQUIDISTANT, OPENCV, CameraModel, Recording
+from hecbench.recording import Recording
 from hecbench.se3 import Array
 from hecbench.targets import grid_shape
 
@@ -134,16 +134,13 @@ def comparable(recording: Recording, most: int) -> Recording | None:
 
 def residuals_px(recording: Recording) -> Array:
     """Rms distance (N,) px of each picture's corners from its own target pose, NaN where there is none."""
+    present = recording.present
     poses, corners, target, camera = (
-        recording.camera_T_target,
-        recording.corners_px,
-        recording.target,
-        recording.camera,
+        present.camera_T_target,
+        present.corners_px,
+        present.target,
+        present.camera,
     )
-    assert poses is not None
-    assert corners is not None
-    assert target is not None
-    assert camera is not None
     squares = ((project(camera, se3.transform_points(poses, target.points_m)) - corners) ** 2).sum(-1)
     seen = np.isfinite(squares)
     return np.where(
@@ -153,8 +150,7 @@ def residuals_px(recording: Recording) -> Array:
 
 def rivals(recording: Recording) -> Iterator[Rival]:
     """The recording as it is, then its rivals, those with fewer unknowns first."""
-    camera = recording.camera
-    assert camera is not None
+    camera = recording.present.camera
     yield Rival(GIVEN, "", "", recording)
     yield from _orders(recording)
     yield from _other_lenses(recording, camera)

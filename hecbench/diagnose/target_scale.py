@@ -59,8 +59,7 @@ def _size(case: Examination, others: list[Explanation]) -> tuple[Finding, Examin
 
 def _camera(case: Examination, alike: list[Explanation]) -> tuple[Finding, Examination]:
     """Another focal length or principal point, and whether the target's size would do as well."""
-    best, camera = alike[0], case.recording.camera
-    assert camera is not None
+    best, camera = alike[0], case.recording.present.camera
     focal, shift = _change(camera, best)
     summary = f"the robot's motion contradicts camera.K, not the target's size: {_values(case, best)}"
     action = "calibrate the camera anew; rectified or cropped pictures need their own matrix"
@@ -81,15 +80,13 @@ def _camera(case: Examination, alike: list[Explanation]) -> tuple[Finding, Exami
 
 def _change(camera: CameraModel, found: Explanation) -> tuple[float, float]:
     """The focal length over the given one, and the shift of the centre over the image's width."""
-    assert camera.K is not None
     fx, fy, cx, cy = found.parameters[:4]
-    focal = float(np.sqrt(fx * fy / camera.K[0, 0] / camera.K[1, 1]))
-    return focal, float(np.hypot(cx - camera.K[0, 2], cy - camera.K[1, 2])) / camera.width
+    focal = float(np.sqrt(fx * fy / camera.intrinsics[0, 0] / camera.intrinsics[1, 1]))
+    return focal, float(np.hypot(cx - camera.intrinsics[0, 2], cy - camera.intrinsics[1, 2])) / camera.width
 
 
 def _values(case: Examination, found: Explanation) -> str:
-    camera = case.recording.camera
-    assert camera is not None
+    camera = case.recording.present.camera
     focal, _ = _change(camera, found)
     fx, fy, cx, cy = found.parameters[:4]
     return f"{found.freed} fx {fx:.1f}, fy {fy:.1f} ({focal:.3f} of the given), cx {cx:.1f}, cy {cy:.1f} fits"

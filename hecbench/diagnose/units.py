@@ -69,8 +69,7 @@ def _unit(scale: float) -> tuple[float, str] | None:
 
 def _rescaled_robot(case: Examination, factor: float) -> Examination:
     """The case with robot translations divided."""
-    poses = case.observed.base_T_flange
-    assert poses is not None
+    poses = case.observed.present.base_T_flange
     poses = poses.copy()
     poses[:, :3, 3] /= factor
     return case.with_robot_poses(poses)

@@ -17,7 +17,8 @@ import numpy as np
 from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.estimate import Estimate, Status, plain
-from hecbench.recording import EQUIDISTANT, CameraModel, Mounting
+from hecbench.lens import EQUIDISTANT, CameraModel
+from hecbench.recording import Mounting
 from hecbench.se3 import Array
 
 OPTIONS = {

@@ -65,9 +65,7 @@ def _chosen(recording: Recording) -> list[int]:
 
 def _drawer(recording: Recording, estimate: Estimate) -> Callable[[int], Picture]:
     """The undistorted photograph, with the robot drawn over it where its model and joints are known."""
-    assert recording.camera is not None
-    assert estimate.parent_T_camera is not None
-    X, undistorted = estimate.parent_T_camera, Undistortion.of(recording.camera)
+    X, undistorted = estimate.pose, Undistortion.of(recording.present.camera)
 
     def plain(sample: int) -> Picture:
         picture = undistorted.image(np.asarray(recording.image(sample)))
@@ -84,9 +82,7 @@ def _with_target(picture: Picture, recording: Recording, estimate: Estimate, sam
     """Rings where the target's points were seen, crosses where the answer predicts them."""
     from PIL import Image, ImageDraw
 
-    camera, target = recording.camera, recording.target
-    assert camera is not None
-    assert camera.K is not None
+    camera, target = recording.present.camera, recording.target
     if target is None or recording.base_T_flange is None:
         return picture
     image = Image.fromarray(picture)
@@ -95,14 +91,13 @@ def _with_target(picture: Picture, recording: Recording, estimate: Estimate, sam
     if recording.corners_px is not None:
         seen = recording.corners_px[sample]
         seen = seen[np.isfinite(seen).all(1)]
-        for u, v in lens.normalised(camera, seen) @ camera.K[:2, :2].T + camera.K[:2, 2]:
+        for u, v in lens.normalised(camera, seen) @ camera.intrinsics[:2, :2].T + camera.intrinsics[:2, 2]:
             draw.ellipse((u - size, v - size, u + size, v + size), outline=_SEEN_RGB, width=1)
     carrier_T_target = _target_pose(recording, estimate)
     if carrier_T_target is not None:
-        assert estimate.parent_T_camera is not None
-        placed = se3.inverse(estimate.parent_T_camera) @ recording.hand_poses()[sample] @ carrier_T_target
+        placed = se3.inverse(estimate.pose) @ recording.hand_poses()[sample] @ carrier_T_target
         points = se3.transform_points(placed, target.points_m)
-        points = points[points[:, 2] > 0] @ camera.K.T
+        points = points[points[:, 2] > 0] @ camera.intrinsics.T
         for u, v in points[:, :2] / points[:, 2:]:
             draw.line((u - size, v, u + size, v), fill=_PREDICTED_RGB)
             draw.line((u, v - size, u, v + size), fill=_PREDICTED_RGB)
@@ -113,8 +108,7 @@ def _target_pose(recording: Recording, estimate: Estimate) -> Array | None:
     """carrier_T_target of the answer, or the mean of what the samples see of it."""
     if estimate.carrier_T_target is not None or recording.camera_T_target is None:
         return estimate.carrier_T_target
-    assert estimate.parent_T_camera is not None
-    seen = se3.inverse(recording.hand_poses()) @ estimate.parent_T_camera @ recording.camera_T_target
+    seen = se3.inverse(recording.hand_poses()) @ estimate.pose @ recording.camera_T_target
     seen = seen[np.isfinite(seen).all((1, 2))]
     return se3.mean(seen) if len(seen) else None
 

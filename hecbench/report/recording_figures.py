@@ -33,16 +33,12 @@ def _predicted_px(evidence: Evidence, estimate: Estimate) -> Array | None:
     X, Y, points_m = estimate.parent_T_camera, estimate.carrier_T_target, evidence.points_m
     if camera is None or camera.K is None or X is None or Y is None or points_m is None:
         return None
-    if evidence.base_T_flange is None:
+    if (hand := evidence.base_T_flange) is None:
         return None
-    camera_T_target = se3.inverse(X) @ _hand(evidence) @ Y
+    if evidence.mounting is Mounting.EYE_IN_HAND:
+        hand = se3.inverse(hand)
+    camera_T_target = se3.inverse(X) @ hand @ Y
     return project(camera, se3.transform_points(camera_T_target, points_m))
-
-
-def _hand(evidence: Evidence) -> Array:
-    assert evidence.base_T_flange is not None
-    eye_to_hand = evidence.mounting is Mounting.EYE_TO_HAND
-    return evidence.base_T_flange if eye_to_hand else se3.inverse(evidence.base_T_flange)
 
 
 def residual_figure(evidence: Evidence, estimate: Estimate) -> str | None:

@@ -55,15 +55,12 @@ class Stage:
     @property
     def samples(self) -> NDArray[np.int64]:
         """Those with a robot pose."""
-        assert self.recording.base_T_flange is not None
-        return np.flatnonzero(np.isfinite(self.recording.base_T_flange).all((1, 2)))
+        return np.flatnonzero(np.isfinite(self.recording.present.base_T_flange).all((1, 2)))
 
     def _look_on(self) -> None:
         """The first view: from above the side, far enough to hold the robot and the recommended camera."""
-        X = self.estimates[0].parent_T_camera
-        assert X is not None
-        assert self.recording.base_T_flange is not None
-        hands = self.recording.base_T_flange[self.samples, :3, 3]
+        X = self.estimates[0].pose
+        hands = self.recording.present.base_T_flange[self.samples, :3, 3]
         away = X[:3, 3] if self.recording.mounting is Mounting.EYE_TO_HAND else hands[0]
         middle = (hands.mean(0) + away) / 2
         reach = max(float(np.linalg.norm(away - hands.mean(0))), 1.0)
@@ -134,8 +131,7 @@ class Stage:
 
     def show(self, sample: int) -> None:
         """Place everything as it was at a sample."""
-        assert self.recording.base_T_flange is not None
-        flange = self.recording.base_T_flange[sample]
+        flange = self.recording.present.base_T_flange[sample]
         moves = self.recording.mounting is Mounting.EYE_IN_HAND
         base_T_parent = flange if moves else np.eye(4)
         if self._links is not None:
@@ -143,8 +139,7 @@ class Stage:
                 for mesh in meshes:
                     _place(mesh, base_T_parent @ self._links[sample, link])
         for frustum, estimate in zip(self._frusta, self.estimates, strict=True):
-            assert estimate.parent_T_camera is not None
-            _place(frustum, base_T_parent @ estimate.parent_T_camera)
+            _place(frustum, base_T_parent @ estimate.pose)
         self._frusta[0].image = self._photograph(sample)
         self._show_target(flange if not moves else np.eye(4))
 

@@ -16,7 +16,8 @@ import msgspec
 import numpy as np
 
 from hecbench.errors import InputError
-from hecbench.recording import OPENCV, CameraModel, Mounting, Recording
+from hecbench.lens import OPENCV, CameraModel
+from hecbench.recording import Mounting, Recording
 from hecbench.se3 import Array
 from hecbench.system import files
 

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from hecbench.errors import InputError
 from hecbench.estimate import plain
-from hecbench.recording import OPENCV, CameraModel, ImageSource, Mounting, Recording, RobotDescription
+from hecbench.lens import OPENCV, CameraModel
+from hecbench.recording import ImageSource, Mounting, Recording, RobotDescription
 from hecbench.robots import urdf_files
 from hecbench.system import files, pictures
 from hecbench.targets import AprilTagTarget, CharucoTarget, ChessboardTarget, PointsTarget, Target

@@ -88,6 +88,5 @@ def _of_folds(estimate: Estimate) -> Uncertainty | None:
     count = len(answers)
     if count <= _LEAST_FREEDOM:
         return None
-    assert estimate.parent_T_camera is not None
-    twists = se3.log(answers @ se3.inverse(estimate.parent_T_camera))
+    twists = se3.log(answers @ se3.inverse(estimate.pose))
     return Uncertainty((count - 1) / count * twists.T @ twists, float(count - 1))

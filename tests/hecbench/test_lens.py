@@ -6,6 +6,10 @@ import pytest
 
 from hecbench.errors import InputError
 from hecbench.lens import (
+    DISTORTION_LENGTHS,
+    EQUIDISTANT,
+    OPENCV,
+    CameraModel,
     FixedSensor,
     Sensor,
     distort,
@@ -14,7 +18,6 @@ from hecbench.lens import (
     project,
     undistort,
 )
-from hecbench.recording import DISTORTION_LENGTHS, EQUIDISTANT, OPENCV, CameraModel
 
 K = np.array([[900.0, 0, 640], [0, 920.0, 350], [0, 0, 1]])
 LENSES = [(model, length) for model, lengths in DISTORTION_LENGTHS.items() for length in lengths]

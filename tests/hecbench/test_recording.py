@@ -123,3 +123,15 @@ def test_target_points():
     tag = AprilTagTarget("tag36h11", 0, 0.2).points_m
     np.testing.assert_allclose(tag[:, :2], [[-0.1, 0.1], [0.1, 0.1], [0.1, -0.1], [-0.1, -0.1]])
     assert not PointsTarget.of([[0, 0, 0], [1, 0, 0.5]]).is_planar
+
+
+def test_present_gives_what_there_is_and_refuses_the_rest_by_name(exact_rig):
+    assert exact_rig.present.camera is exact_rig.camera
+    assert exact_rig.present.camera.intrinsics is exact_rig.camera.K
+    bare = replace(exact_rig, camera=None, corners_px=None)
+    with pytest.raises(Refusal, match=f"recording '{exact_rig.name}' has no camera"):
+        _ = bare.present.camera
+    with pytest.raises(AttributeError, match="not_a_field"):
+        _ = bare.present.not_a_field
+    with pytest.raises(Refusal, match="K is not known"):
+        _ = replace(exact_rig.camera, K=None).intrinsics

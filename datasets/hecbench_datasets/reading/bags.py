@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench.errors import InputError
-from hecbench.recording import EQUIDISTANT, OPENCV, CameraModel
+from hecbench.lens import EQUIDISTANT, OPENCV, CameraModel
 from hecbench_datasets.reading.sources import files_in
 
 Picture = NDArray[np.uint8]

@@ -61,14 +61,12 @@ class LabCamera:
         """The recording with the robot's mask of every picture and the camera's true pose, saved in its folder."""
         from hecbench.storage import recording_io
 
-        assert recording.joints_rad is not None
-        assert recording.folder is not None
         masks = []
-        for joints in recording.joints_rad:
+        for joints in recording.present.joints_rad:
             self.eye.scene.place(joints, self.base_T_workpiece)
             masks.append(self.eye.mask(self.base_T_camera).astype(np.uint8) * np.uint8(255))
         complete = replace(recording, masks=tuple(masks), truth_parent_T_camera=self.base_T_camera)
-        recording_io.save(complete, recording.folder)
+        recording_io.save(complete, recording.present.folder)
         return complete
 
     def intrinsics(self) -> CameraModel | None:

@@ -109,8 +109,7 @@ class Eye:
 
     @property
     def _K(self) -> Array:
-        assert self.camera.K is not None
-        return self.camera.K
+        return self.camera.intrinsics
 
     def _reduced(self, drawn: Image) -> Image:
         """From the drawn pinhole picture to the sensor's pixels."""
@@ -132,8 +131,7 @@ def _without_distortion(
     camera: CameraModel, supersample: int
 ) -> tuple[CameraModel, tuple[NDArray[np.float32], NDArray[np.float32]] | None]:
     """The pinhole camera to draw with, and where each supersampled pixel of the real one lies in its picture."""
-    assert camera.K is not None
-    skewed = camera.K[0, 1] != 0
+    skewed = camera.intrinsics[0, 1] != 0
     if camera.is_pinhole and not skewed:
         return _enlarged(camera, supersample), None
     import cv2
@@ -142,7 +140,7 @@ def _without_distortion(
     pixels = np.column_stack([u.ravel(), v.ravel()])
     rays = normalised(camera, pixels)
     low, high = rays.min(0), rays.max(0)
-    focal = supersample * camera.K[[0, 1], [0, 1]]
+    focal = supersample * camera.intrinsics[[0, 1], [0, 1]]
     width, height = (int(side) for side in np.ceil((high - low) * focal) + 3)
     centre = 1 - low * focal
     K = np.array([[focal[0], 0, centre[0]], [0, focal[1], centre[1]], [0, 0, 1]])
@@ -154,8 +152,7 @@ def _without_distortion(
 
 def _enlarged(camera: CameraModel, factor: int) -> CameraModel:
     """The same view with more pixels; pixel centres are at integers in both."""
-    assert camera.K is not None
-    K = camera.K.copy()
+    K = camera.intrinsics.copy()
     K[:2] *= factor
     K[:2, 2] += (factor - 1) / 2
     return replace(camera, width=camera.width * factor, height=camera.height * factor, K=K)

@@ -131,16 +131,14 @@ def with_pictures(
     recording: Recording, station: Station, rng: np.random.Generator, sensor: Sensor = _SENSOR, room: int = 0
 ) -> Recording:
     """The recording with a picture and a mask of the arm for each of its samples, seen from its truth."""
-    assert recording.camera is not None
-    assert recording.joints_rad is not None
-    assert recording.truth_parent_T_camera is not None
-    eye = Eye(station.scene(room=room), recording.camera, sensor)
+    present = recording.present
+    eye = Eye(station.scene(room=room), present.camera, sensor)
     images, masks = [], []
     try:
-        for joints in recording.joints_rad:
+        for joints in present.joints_rad:
             eye.scene.place(joints)
-            images.append(eye.image(recording.truth_parent_T_camera, rng))
-            masks.append(eye.mask(recording.truth_parent_T_camera).astype(np.uint8) * np.uint8(255))
+            images.append(eye.image(present.truth_parent_T_camera, rng))
+            masks.append(eye.mask(present.truth_parent_T_camera).astype(np.uint8) * np.uint8(255))
     finally:
         eye.close()
     return replace(recording, images=tuple(images), masks=tuple(masks))

@@ -139,8 +139,7 @@ class Scene:
 
         every = mujoco.mjtCatBit.mjCAT_ALL
         mujoco.mjv_updateScene(self.model, self.data, self._option, None, self._camera, every, self._view)
-        assert camera.K is not None
-        (fx, _, cx), (_, fy, cy), _ = camera.K.tolist()
+        (fx, _, cx), (_, fy, cy), _ = camera.intrinsics.tolist()
         left, right = (-0.5 - cx) / fx, (camera.width - 0.5 - cx) / fx
         top, bottom = (0.5 + cy) / fy, (0.5 + cy - camera.height) / fy
         for eye in self._view.camera:

@@ -79,9 +79,7 @@ def diverse_plan(
         InputError: The cell lacks something, or fewer than `count` poses can be reached and seen.
     """
     seen, parent_T_camera, carrier_T_target, start = _seed(cell, arm)
-    camera, target = cell.camera, cell.target
-    assert camera
-    assert target
+    camera, target = cell.present.camera, cell.present.target
     camera_T_target = _candidates(seen, view or View(), rng)
     camera_T_target = camera_T_target[_in_view(camera_T_target, camera, target.points_m)]
     hand = parent_T_camera @ camera_T_target @ se3.inverse(carrier_T_target)
@@ -132,9 +130,7 @@ def informative_plan(
             raise InputError(
                 f"{cell.name}: planning views of the robot needs {name}, roughly; add it to the cell"
             )
-    assert cell.joints_rad is not None
-    assert cell.initial_parent_T_camera is not None
-    view, start = next_view.RobotView(cell), six_joints(cell.joints_rad[0])
+    view, start = next_view.RobotView(cell), six_joints(cell.present.joints_rad[0])
     drawn = start + rng.uniform(-1, 1, (_LOOKS, 6)) * _WANDER_RAD
     free = [joints for joints in drawn if _free_path(arm, start, joints, limits)]
     if len(free) < count:
@@ -142,7 +138,7 @@ def informative_plan(
             f"{cell.name}: only {len(free)} of {count} poses can be reached within the limits: ask for fewer, widen"
             " the limits, or start from another pose"
         )
-    camera = cell.initial_parent_T_camera
+    camera = cell.present.initial_parent_T_camera
     known = next_view.prior_information() + view.look(start, camera).information
     arguments = view, camera, np.array(free), known, count - 1
     if criterion is Criterion.D_OPTIMAL:
@@ -176,6 +172,7 @@ def _toured(cell: Recording, chosen: Array, arm: Arm, limits: Limits, count: int
 
 def _seed(cell: Recording, arm: Arm) -> tuple[Array, Array, Array, Array]:
     """camera_T_target, parent_T_camera, carrier_T_target (4, 4) and joints (6,) of the first sample."""
+    present = cell.present
     needed = {
         "camera.K": cell.camera and cell.camera.K,
         "target": cell.target,
@@ -186,13 +183,15 @@ def _seed(cell: Recording, arm: Arm) -> tuple[Array, Array, Array, Array]:
     for name, value in needed.items():
         if value is None:
             raise InputError(f"{cell.name}: planning poses needs {name}, roughly; add it to the cell")
-    assert cell.joints_rad is not None
-    assert cell.camera_T_target is not None
-    assert cell.initial_parent_T_camera is not None
-    start, seen = six_joints(cell.joints_rad[0]), cell.camera_T_target[0]
+    start, seen = six_joints(present.joints_rad[0]), present.camera_T_target[0]
     base_T_flange = arm.forward(start)
     hand = base_T_flange if cell.mounting is Mounting.EYE_TO_HAND else se3.inverse(base_T_flange)
-    return seen, cell.initial_parent_T_camera, se3.inverse(hand) @ cell.initial_parent_T_camera @ seen, start
+    return (
+        seen,
+        present.initial_parent_T_camera,
+        se3.inverse(hand) @ present.initial_parent_T_camera @ seen,
+        start,
+    )
 
 
 def _candidates(seen: Array, view: View, rng: np.random.Generator) -> Array:
@@ -219,9 +218,8 @@ def _faced(camera_R_target: Array) -> Array:
 
 def _in_view(camera_T_target: Array, camera: CameraModel, points_m: Array) -> Array:
     """Which poses (N,) show the whole target, clear of the edges; distortion is left out."""
-    assert camera.K is not None
     points = se3.transform_points(camera_T_target, points_m)
-    projected = points @ camera.K.T
+    projected = points @ camera.intrinsics.T
     depth = np.maximum(projected[..., 2:], 1e-9)
     size = np.array([camera.width, camera.height])
     inside = np.abs(projected[..., :2] / depth / size - 0.5) < 0.5 - _MARGIN

@@ -65,14 +65,11 @@ def from_estimates(
                 continue
             _refuse_foreign(name, estimate, parent_link, camera)
             place = number if number is not None else _number(name, estimate)
-            assert estimate.parent_T_camera is not None
             errors = dict(estimate.errors or {})
             if truth is not None:
-                errors |= _errors(estimate.parent_T_camera, truth(place))
+                errors |= _errors(estimate.pose, truth(place))
             found.append(
-                Calibration(
-                    estimate.recording, estimate.solver, place, estimate.parent_T_camera, errors, estimate
-                )
+                Calibration(estimate.recording, estimate.solver, place, estimate.pose, errors, estimate)
             )
     return found, unanswered
 

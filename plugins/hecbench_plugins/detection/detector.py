@@ -110,8 +110,7 @@ def _calibrated(
         result = calibrate(target.points_m, corners_px, (width, height))
     except InputError as error:
         raise InputError(f"{recording.name}: {error}") from error
-    K = result.camera.K
-    assert K is not None
+    K = result.camera.intrinsics
     return result.camera, (
         f"intrinsics calibrated from {result.images} images: fx {K[0, 0]:.1f}, fy {K[1, 1]:.1f} "
         f"+- {result.focal_sigma_px:.1f} px, rms {result.rms_px:.2f} px"
@@ -122,8 +121,7 @@ def _turn(recording: Recording, shape: tuple[int, int]) -> tuple[Recording, str]
     """Read each board from the end that the hand motion demands."""
     from hecbench_plugins.markers.target_poses import planar_candidates
 
-    corners = recording.corners_px
-    assert corners is not None
+    corners = recording.present.corners_px
     columns, rows = shape
     seen = np.isfinite(corners).all((1, 2))
     if recording.base_T_flange is not None:

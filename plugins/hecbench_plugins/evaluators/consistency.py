@@ -30,12 +30,12 @@ def consistency(
     The spreads are the standard deviations s_R and s_t of Strobl and Hirzinger 2006, "Optimal hand-eye calibration":
     for a given X the best rotation and translation of Y separate, and so do they.
     """
-    X = estimate.parent_T_camera
-    assert X is not None
-    assert recording.camera_T_target is not None
+    X = estimate.pose
     hand = recording.hand_poses()
-    usable = np.isfinite(hand).all((1, 2)) & np.isfinite(recording.camera_T_target).all((1, 2))
-    targets = carrier_T_target_per_sample(PosedSamples(hand[usable], recording.camera_T_target[usable]), X)
+    usable = np.isfinite(hand).all((1, 2)) & np.isfinite(recording.present.camera_T_target).all((1, 2))
+    targets = carrier_T_target_per_sample(
+        PosedSamples(hand[usable], recording.present.camera_T_target[usable]), X
+    )
     offsets = targets[:, :3, 3] - targets[:, :3, 3].mean(0)
     found = {
         "target_spread_deg": rotation_spread_deg(targets[:, :3, :3]),
@@ -56,10 +56,12 @@ def reconstruction_errors_m(parent_T_camera: Array, recording: Recording) -> Arr
     ``inverse(H) @ X``; the pattern is then laid onto the points by the best rigid motion, so that no method's own
     estimate of the target's pose enters (RAE: Tabb and Ahmad Yousef 2017, section 5.3, there with that estimate).
     """
-    camera, target, corners_px = recording.camera, recording.target, recording.corners_px
-    assert camera is not None
-    assert target is not None
-    assert corners_px is not None
+    present = recording.present
+    camera, target, corners_px = (
+        present.camera,
+        present.target,
+        present.corners_px,
+    )
     hand = recording.hand_poses()
     known = np.flatnonzero(np.isfinite(hand).all((1, 2)))
     other_T_camera = se3.inverse(hand[known]) @ parent_T_camera

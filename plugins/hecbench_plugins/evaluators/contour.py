@@ -65,11 +65,10 @@ def agreement(recording: Recording, estimate: Estimate) -> Array:
     from hecbench_plugins.maskless.align import schedule
     from hecbench_plugins.maskless.solver import Photographs
 
-    assert estimate.parent_T_camera is not None
     photographs = Photographs.of(recording)
     _, last = schedule(photographs.canvas.valid.shape[1])
     matcher = photographs.lines(last, photographs.canvas)
-    pose = se3.inverse(estimate.parent_T_camera)
+    pose = se3.inverse(estimate.pose)
     matcher.learn(pose, last.spacing)
     found = matcher(pose, last.spacing)
     return np.column_stack([found.view_rms_px, found.view_confirmed_share])

@@ -38,9 +38,8 @@ def held_out(
     the intrinsics is judged with its own camera: pixels are predicted by it, and what it saw is computed again by it.
     """
     hand = recording.hand_poses()
-    assert recording.camera_T_target is not None
     usable = np.flatnonzero(
-        np.isfinite(hand).all((1, 2)) & np.isfinite(recording.camera_T_target).all((1, 2))
+        np.isfinite(hand).all((1, 2)) & np.isfinite(recording.present.camera_T_target).all((1, 2))
     )
     residuals: dict[str, Array] = {}
     answers: list[Array] = []
@@ -52,12 +51,11 @@ def held_out(
         if fitted is None or fitted.status is not Status.OK:
             failed += 1
             continue
-        assert fitted.parent_T_camera is not None
-        answers.append(fitted.parent_T_camera)
+        answers.append(fitted.pose)
         seen_by = _seen_by(fitted.camera or recording.camera, recording)
-        carrier_T_target = refit_target(fitted.parent_T_camera, seen_by.subset(training))
+        carrier_T_target = refit_target(fitted.pose, seen_by.subset(training))
         for i in fold.tolist():
-            off = _residuals(fitted.parent_T_camera, carrier_T_target, seen_by, i)
+            off = _residuals(fitted.pose, carrier_T_target, seen_by, i)
             residuals[recording.sample_ids[i]] = off
     found: dict[str, Any] = {"folds": len(folds), "failed_folds": failed, "samples": len(residuals)}
     if _solved_again(answers, estimate):
@@ -92,8 +90,7 @@ def _folds(
     recording: Recording, usable: NDArray[np.int64], rng: np.random.Generator
 ) -> list[NDArray[np.int64]]:
     """At most five sets of samples; those of one robot pose share its error and stay together."""
-    assert recording.base_T_flange is not None
-    labels = standstills(recording.base_T_flange[usable])
+    labels = standstills(recording.present.base_T_flange[usable])
     groups = [usable[labels == label] for label in np.unique(labels)]
     parts = np.array_split(rng.permutation(len(groups)), min(FOLDS, len(groups)))
     return [np.concatenate([groups[i] for i in part]) for part in parts if len(part)]
@@ -101,19 +98,16 @@ def _folds(
 
 def refit_target(parent_T_camera: Array, recording: Recording) -> Array:
     """Y (4, 4) given X: least reprojection error where there are corners, else the mean of what samples see."""
+    present = recording.present
     from scipy.optimize import least_squares
 
     hand = recording.hand_poses()
-    assert recording.camera_T_target is not None
-    start = se3.mean(se3.inverse(hand) @ parent_T_camera @ recording.camera_T_target)
+    start = se3.mean(se3.inverse(hand) @ parent_T_camera @ present.camera_T_target)
     if not _has_pixels(recording):
         return start
-    assert recording.corners_px is not None
-    assert recording.camera is not None
-    assert recording.target is not None
-    camera, points_m = recording.camera, recording.target.points_m
-    seen = np.isfinite(recording.corners_px).all(-1)
-    observed_px = recording.corners_px[seen]
+    camera, points_m = present.camera, present.target.points_m
+    seen = np.isfinite(present.corners_px).all(-1)
+    observed_px = present.corners_px[seen]
     camera_T_other = se3.inverse(parent_T_camera) @ hand
 
     def residuals_px(twist: Array) -> Array:
@@ -131,17 +125,14 @@ def _has_pixels(recording: Recording) -> bool:
 
 def _residuals(parent_T_camera: Array, carrier_T_target: Array, recording: Recording, i: int) -> Array:
     """[rms px or NaN, mm, deg] of one sample."""
-    assert recording.camera_T_target is not None
+    present = recording.present
     predicted = se3.inverse(parent_T_camera) @ recording.hand_poses()[i] @ carrier_T_target
-    observed = recording.camera_T_target[i]
+    observed = present.camera_T_target[i]
     pixels = np.nan
     if _has_pixels(recording):
-        assert recording.corners_px is not None
-        assert recording.camera is not None
-        assert recording.target is not None
-        seen = np.isfinite(recording.corners_px[i]).all(-1)
-        offsets = project(recording.camera, predicted, recording.target.points_m[seen])
-        pixels = np.sqrt(((offsets - recording.corners_px[i][seen]) ** 2).sum(1).mean())
+        seen = np.isfinite(present.corners_px[i]).all(-1)
+        offsets = project(present.camera, predicted, present.target.points_m[seen])
+        pixels = np.sqrt(((offsets - present.corners_px[i][seen]) ** 2).sum(1).mean())
     millimetres = 1e3 * se3.translation_error_m(predicted, observed)
     return np.array([pixels, millimetres, np.rad2deg(se3.rotation_error_rad(predicted, observed))])
 

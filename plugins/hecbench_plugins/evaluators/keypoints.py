@@ -44,12 +44,9 @@ def has_keypoints(recording: Recording) -> bool:
 
 def pixel_errors(estimate: Estimate, recording: Recording) -> tuple[Array, NDArray[np.intp]]:
     """Distances (K,) px of the keypoints seen, infinite behind the camera, and the sample (K,) of each."""
-    camera, corners, target = estimate.camera or recording.camera, recording.corners_px, recording.target
-    assert camera is not None
-    assert corners is not None
-    assert target is not None
-    assert estimate.parent_T_camera is not None
-    camera_T_target = se3.inverse(estimate.parent_T_camera) @ recording.hand_poses()
+    camera, corners = estimate.camera or recording.present.camera, recording.present.corners_px
+    target = recording.present.target
+    camera_T_target = se3.inverse(estimate.pose) @ recording.hand_poses()
     placed = np.asarray(np.isfinite(camera_T_target).all((1, 2)))
     samples, points = np.nonzero(np.isfinite(corners).all(-1) & placed[:, None])
     in_camera = se3.transform_points(camera_T_target, target.points_m)[samples, points]
@@ -76,8 +73,7 @@ def pck(
     errors, samples = pixel_errors(estimate, recording)
     if not len(errors):
         return {}
-    assert recording.base_T_flange is not None
-    poses = np.unique(recording.base_T_flange[np.unique(samples)].round(9), axis=0)
+    poses = np.unique(recording.present.base_T_flange[np.unique(samples)].round(9), axis=0)
     return {
         "keypoints": len(errors),
         "keypoint_poses": len(poses),
@@ -101,10 +97,9 @@ def add(
     rng: np.random.Generator,
 ) -> Mapping[str, float]:
     """Mean distance of the recording's keypoints from where the truth has them, in the camera's frame, and its area."""
-    assert recording.target is not None
     hand = recording.hand_poses()
     known = np.isfinite(hand).all((1, 2))
-    points = se3.transform_points(hand[known], recording.target.points_m)
+    points = se3.transform_points(hand[known], recording.present.target.points_m)
     distances_mm = distances_to_truth_mm(estimate, recording, points)
     return {"add_mm": float(distances_mm.mean()), "add_auc_400_mm": area(distances_mm, _BAXTER_AREA_MM)}
 
@@ -131,11 +126,9 @@ def links_add(
 
 def distances_to_truth_mm(estimate: Estimate, recording: Recording, points: Array) -> Array:
     """For each sample the mean distance (N,) mm, in the camera's frame, of points (N, P, 3) m of the parent's frame."""
-    assert estimate.parent_T_camera is not None
-    assert recording.truth_parent_T_camera is not None
     estimated, true = (
         se3.transform_points(se3.inverse(pose), points)
-        for pose in (estimate.parent_T_camera, recording.truth_parent_T_camera)
+        for pose in (estimate.pose, recording.present.truth_parent_T_camera)
     )
     return np.asarray(1e3 * np.linalg.norm(estimated - true, axis=-1).mean(1))
 

@@ -36,10 +36,8 @@ def overlaps(recording: Recording, parent_T_camera: Array, samples: Sequence[int
 
 def masked_samples(recording: Recording) -> list[int]:
     """The samples with joints and a mask."""
-    assert recording.masks is not None
-    assert recording.joints_rad is not None
-    has_joints = np.atleast_1d(np.isfinite(recording.joints_rad).all(1))
-    return [i for i, mask in enumerate(recording.masks) if mask is not None and has_joints[i]]
+    has_joints = np.atleast_1d(np.isfinite(recording.present.joints_rad).all(1))
+    return [i for i, mask in enumerate(recording.present.masks) if mask is not None and has_joints[i]]
 
 
 def of_answer(
@@ -50,8 +48,7 @@ def of_answer(
     rng: np.random.Generator,
 ) -> Mapping[str, float]:
     """The robot drawn at the estimate against the masks that the solver got: mean and least over the samples."""
-    assert estimate.parent_T_camera is not None
-    found = overlaps(recording, estimate.parent_T_camera, masked_samples(recording))
+    found = overlaps(recording, estimate.pose, masked_samples(recording))
     return {"mask_iou": float(np.mean(found)), "mask_iou_least": min(found)}
 
 
@@ -76,8 +73,7 @@ def of_left_out_views(
         if fitted.status is not Status.OK:
             failed += 1
             continue
-        assert fitted.parent_T_camera is not None
-        found += overlaps(recording, fitted.parent_T_camera, fold.tolist())
+        found += overlaps(recording, fitted.pose, fold.tolist())
     counts: dict[str, Any] = {"folds": len(folds), "failed_folds": failed, "samples": len(found)}
     if not found:
         return counts
@@ -95,8 +91,7 @@ def of_masks(
     rng: np.random.Generator,
 ) -> Mapping[str, float]:
     """The masks against the robot drawn at the truth: mean over the samples. Says nothing of the estimate."""
-    assert recording.truth_parent_T_camera is not None
-    found = overlaps(recording, recording.truth_parent_T_camera, masked_samples(recording))
+    found = overlaps(recording, recording.present.truth_parent_T_camera, masked_samples(recording))
     return {"masks_iou_truth": float(np.mean(found))}
 
 

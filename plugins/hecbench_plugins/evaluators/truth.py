@@ -28,9 +28,7 @@ def errors(
     `tre_mm` judges the pose alone; `pair_tre_mm` the pose with the camera that the estimate brings. They differ only
     where the method changed the intrinsics, and then only the second is what a user of the pair meets.
     """
-    estimated, true = estimate.parent_T_camera, recording.truth_parent_T_camera
-    assert estimated is not None
-    assert true is not None
+    estimated, true = estimate.pose, recording.present.truth_parent_T_camera
     inverses = se3.inverse(estimated), se3.inverse(true)
     found = {
         "translation_error_mm": 1e3 * float(se3.translation_error_m(estimated, true)),
@@ -54,9 +52,7 @@ def pair_error_m(estimate: Estimate, recording: Recording, points_m: Array) -> f
     nothing there. None when no point is inside, or when a camera is not known.
     """
     true_camera, camera = recording.camera, estimate.camera or recording.camera
-    estimated, true = estimate.parent_T_camera, recording.truth_parent_T_camera
-    assert estimated is not None
-    assert true is not None
+    estimated, true = estimate.pose, recording.present.truth_parent_T_camera
     if true_camera is None or camera is None or true_camera.K is None or camera.K is None:
         return None
     if same(camera, true_camera):

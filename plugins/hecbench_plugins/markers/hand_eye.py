@@ -106,15 +106,13 @@ def posed_samples(recording: Recording) -> tuple[Array, Array]:
         raise Refusal(
             f"{both.sum()} samples have a robot and a target pose; at least {MINIMUM_SAMPLES} are needed"
         )
-    assert once.camera_T_target is not None
-    return once.hand_poses()[both], once.camera_T_target[both]
+    return once.hand_poses()[both], once.present.camera_T_target[both]
 
 
 def _both(recording: Recording) -> NDArray[np.bool_]:
     """Which samples have a robot pose and a target pose."""
-    assert recording.camera_T_target is not None
     known = np.isfinite(recording.hand_poses()).all((1, 2))
-    return np.asarray(known & np.isfinite(recording.camera_T_target).all((1, 2)))
+    return np.asarray(known & np.isfinite(recording.present.camera_T_target).all((1, 2)))
 
 
 def rotation_diversity_deg(rotation_logs: Array) -> Array:

@@ -42,11 +42,10 @@ def corner_problem(recording: Recording, prior_sigmas: Array | None = None) -> P
     camera, target, corners_px = recording.camera, recording.target, recording.corners_px
     if camera is None or camera.K is None or target is None or corners_px is None:
         raise Refusal("needs corners_px, target and camera.K")
-    assert recording.base_T_flange is not None
-    usable = np.isfinite(recording.base_T_flange).all((1, 2)) & np.isfinite(corners_px).any((1, 2))
+    usable = np.isfinite(recording.present.base_T_flange).all((1, 2)) & np.isfinite(corners_px).any((1, 2))
     problem = Problem(
         recording.mounting,
-        recording.base_T_flange[usable],
+        recording.present.base_T_flange[usable],
         target.points_m,
         corners_px[usable],
         FixedSensor(camera),

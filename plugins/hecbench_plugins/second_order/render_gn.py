@@ -88,7 +88,9 @@ class RenderGN:
             end = self._extend(end, robot, trace)
         found = evidence.answer(views, end, overlap, trace, _TERMINATIONS[end.descent.ended])
         return (
-            replace(found, camera=_calibrated(recording.camera, found)) if "focal" in found.extras else found
+            replace(found, camera=_calibrated(recording.present.camera, found))
+            if "focal" in found.extras
+            else found
         )
 
     def _extend(self, end: evidence.FinalStage, robot: PosedRobot, trace: Trace) -> evidence.FinalStage:
@@ -204,10 +206,8 @@ class RenderGN:
         )
 
 
-def _calibrated(camera: CameraModel | None, found: Estimate) -> CameraModel:
+def _calibrated(camera: CameraModel, found: Estimate) -> CameraModel:
     """The recording's camera with the focal length that was found."""
-    assert camera is not None
-    assert camera.K is not None
-    K = camera.K.copy()
+    K = camera.intrinsics.copy()
     K[:2, :2] *= np.exp(found.extras["focal"]["value"])
     return replace(camera, K=K)

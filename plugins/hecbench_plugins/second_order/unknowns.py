@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Any
 
@@ -40,11 +40,10 @@ class ExtendedPhotometry(Photometry):
     `values` holds their current estimates. The robot is scaled about the parent's origin.
     """
 
-    robot: PosedRobot | None = None
-    free: tuple[Unknown, ...] = ()
+    robot: PosedRobot = field(kw_only=True)
+    free: tuple[Unknown, ...] = field(kw_only=True)
 
     def __post_init__(self) -> None:
-        assert self.robot is not None
         self.labels = [
             (unknown, name)
             for unknown in self.free
@@ -92,12 +91,10 @@ class ExtendedPhotometry(Photometry):
         offsets = self.value(Unknown.JOINTS)
         if not len(offsets):
             return view.parent_T_link
-        assert self.robot is not None
         return self.robot.clipped_link_poses(view.joints_rad + offsets)
 
     def _joint_twists(self, view: View) -> Array:
         """Left twists (J, L, 6) of parent_T_link per rad of every joint, the links scaled with the robot."""
-        assert self.robot is not None
         scaled = self.robot.twists(view.joints_rad + self.value(Unknown.JOINTS))
         scaled[..., 3:] *= self._scale()
         return scaled

@@ -81,8 +81,7 @@ def _with_start(unlike: Floats, recording: Recording, samples: list[int]) -> Mas
     """
     from hecbench_plugins.views.silhouettes import Silhouettes
 
-    start = recording.initial_parent_T_camera
-    assert start is not None
+    start = recording.present.initial_parent_T_camera
     silhouettes, wide = Silhouettes(recording), Silhouettes(recording, _REACH_SHRINK)
     starts = Uncertainty().around(start)
     drawable = set(silhouettes.samples.tolist())

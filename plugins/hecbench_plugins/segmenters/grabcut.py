@@ -51,8 +51,7 @@ class GrabCut:
         if missing := needed - recording.offers():
             raise Refusal(f"{recording.name}: grabcut needs {', '.join(sorted(missing))}")
         silhouettes = Silhouettes(recording, _SHRINK)
-        assert recording.initial_parent_T_camera is not None
-        starts = self.uncertainty.around(recording.initial_parent_T_camera)
+        starts = self.uncertainty.around(recording.present.initial_parent_T_camera)
         masks: list[NDArray[np.uint8] | None] = [None] * len(recording)
         for sample in silhouettes.samples.tolist():
             if recording.images is not None and recording.images[sample] is not None:

@@ -49,8 +49,7 @@ class Learned:
                 f"{recording.name}: no robot is seen in any of the {len(samples)} images: another robot, or a camera"
                 " that looks elsewhere?"
             )
-        notes, robot = recording.notes, recording.robot
-        assert robot is not None
+        notes, robot = recording.notes, recording.present.robot
         if robot.model is not None and (arm := robot_of(recording)) != robot.model:
             robot = replace(robot, model=arm)
             notes = (*notes, f"masks: of the arm without its tool; the robot is taken as {arm}")

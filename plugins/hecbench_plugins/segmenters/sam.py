@@ -69,8 +69,7 @@ class SegmentAnything:
 
         encoder, decoder = _session(Path(self.encoder)), _session(Path(self.decoder), _DECODER_INPUTS)
         silhouettes = Silhouettes(recording)
-        assert recording.initial_parent_T_camera is not None
-        starts = self.uncertainty.around(recording.initial_parent_T_camera)
+        starts = self.uncertainty.around(recording.present.initial_parent_T_camera)
         masks: list[NDArray[np.uint8] | None] = [None] * len(recording)
         for sample in silhouettes.samples.tolist():
             if recording.images is None or recording.images[sample] is None:

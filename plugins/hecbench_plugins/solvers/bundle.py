@@ -40,8 +40,7 @@ class IntrinsicsPrior:
 
     def sigmas(self, camera: CameraModel) -> np.ndarray:
         """(4 + D,) of fx, fy, cx, cy (px) and the distortion coefficients."""
-        assert camera.K is not None
-        focals = self.focal * np.diag(camera.K)[:2]
+        focals = self.focal * np.diag(camera.intrinsics)[:2]
         return np.array(
             [*focals, *[self.centre * camera.width] * 2, *[self.distortion] * len(camera.distortion)]
         )

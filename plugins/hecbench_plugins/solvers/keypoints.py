@@ -70,16 +70,14 @@ class Keypoints:
             refined,
         )
 
-        camera = recording.camera
-        assert camera is not None
-        assert camera.K is not None
+        camera = recording.present.camera
         seen, views, masks = self._sightings(recording)
         if len(seen.points) < self.fewest:
             raise Refusal(
                 f"{recording.name}: {len(seen.points)} keypoints are trusted in {views} images, {self.fewest} are"
                 " needed: give more views, or views that show the whole robot"
             )
-        limit = self.limit_px * camera.width / REFERENCE_WIDTH_PX / float(camera.K[0, 0])
+        limit = self.limit_px * camera.width / REFERENCE_WIDTH_PX / float(camera.intrinsics[0, 0])
         seen = independent(seen)
         answer = refined(seen, consensus(seen, limit, self.rounds, rng), limit)
         share = float(answer.inliers.mean())
@@ -106,7 +104,7 @@ class Keypoints:
                 "trusted_keypoints": len(seen.points),
                 "agreeing_share": share,
                 "keypoint_kinds": kinds,
-                "rms_px": answer.rms * float(camera.K[0, 0]),
+                "rms_px": answer.rms * float(camera.intrinsics[0, 0]),
             },
         )
         return _aligned(found, recording, masks, rng) if self.refine else found
@@ -119,8 +117,7 @@ class Keypoints:
         from hecbench_plugins.perception.choice import perceiver_for, robot_of
         from hecbench_plugins.perception.keypoint_pose import Sightings
 
-        perceiver, camera = perceiver_for(recording, self.model), recording.camera
-        assert camera is not None
+        perceiver, camera = perceiver_for(recording, self.model), recording.present.camera
         try:
             posed = PosedRobot.of(recording, meshes=False)
             parent_T_link = posed.link_poses(posed.joints_rad[posed.samples])
@@ -159,8 +156,7 @@ def _aligned(
     from hecbench_plugins.perception.choice import robot_of
     from hecbench_plugins.second_order.render_gn import RenderGN
 
-    robot = recording.robot
-    assert robot is not None
+    robot = recording.present.robot
     if robot.model is not None:
         robot = replace(robot, model=robot_of(recording))
     ready = replace(recording, masks=tuple(masks), robot=robot, initial_parent_T_camera=found.parent_T_camera)

@@ -264,9 +264,7 @@ class GuessFree:
 
     def _contradicts(self, other: Estimate, best: Estimate) -> bool:
         """Whether another end is as good as the best, and not the same."""
-        assert other.parent_T_camera is not None
-        assert best.parent_T_camera is not None
-        if alike(se3.inverse(other.parent_T_camera), se3.inverse(best.parent_T_camera)):
+        if alike(se3.inverse(other.pose), se3.inverse(best.pose)):
             return False
         return bool(
             other.diagnostics["overlap"] >= best.diagnostics["overlap"] - self.same_overlap
@@ -275,6 +273,5 @@ class GuessFree:
 
 
 def _told(end: Estimate) -> str:
-    assert end.parent_T_camera is not None
-    place = ", ".join(f"{x:.2f}" for x in end.parent_T_camera[:3, 3])
+    place = ", ".join(f"{x:.2f}" for x in end.pose[:3, 3])
     return f"at ({place}) m with overlap {end.diagnostics['overlap']:.3f}"

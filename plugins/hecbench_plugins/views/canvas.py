@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench.errors import InputError, Refusal
-from hecbench.recording import EQUIDISTANT, CameraModel, Recording
+from hecbench.lens import EQUIDISTANT, CameraModel
+from hecbench.recording import Recording
 from hecbench.rendering.undistort import shrunk_intrinsics
 from hecbench.robots.posed import PosedRobot
 from hecbench.se3 import Array
@@ -73,8 +74,7 @@ def undistorted_canvas(recording: Recording, robot: PosedRobot) -> Canvas:
         Refusal: there is none, or an image holds values that are not finite.
         InputError: an image cannot be read or is not of the camera's size; joints are outside their limits.
     """
-    camera, joints = recording.camera, robot.joints_rad
-    assert camera is not None
+    camera, joints = recording.present.camera, robot.joints_rad
     sources = recording.images or ()
     rows = [i for i in robot.samples.tolist() if i < len(sources) and sources[i] is not None]
     if not rows:
@@ -106,17 +106,16 @@ def _lens(
     """Where each pixel of the canvas lies in the image, the canvas' K, and where that is inside the image."""
     import cv2
 
-    assert camera.K is not None
     pad = 0 if camera.is_pinhole else PAD_PX
     width, height = (-(-(size + 2 * pad) // _GRID) * _GRID for size in (camera.width, camera.height))
-    K = camera.K.copy()
+    K = camera.intrinsics.copy()
     K[:2, 2] += pad
-    if camera.K[0, 1] != 0:
+    if camera.intrinsics[0, 1] != 0:
         raise InputError("camera.K: has skew, which the undistortion of photographs does not support")
     fisheye = camera.distortion_model == EQUIDISTANT
     rectify: Any = cv2.fisheye.initUndistortRectifyMap if fisheye else cv2.initUndistortRectifyMap
     coefficients = camera.distortion if len(camera.distortion) else np.zeros(4)
-    across, down = rectify(camera.K, coefficients, np.eye(3), K, (width, height), cv2.CV_32FC1)
+    across, down = rectify(camera.intrinsics, coefficients, np.eye(3), K, (width, height), cv2.CV_32FC1)
     valid = (across >= 0) & (down >= 0) & (across <= camera.width - 1) & (down <= camera.height - 1)
     return (across, down), K, valid
 

@@ -106,11 +106,10 @@ def prepare(recording: Recording) -> tuple[PosedRobot, list[View]]:
     """
     try:
         robot = photographed_robot(recording)
-        assert recording.camera is not None
         meshes = meshes_by_level(robot.model)
         rows = robot.samples
         poses = robot.link_poses(robot.joints_rad[rows])
-        pinhole = Undistortion.of(recording.camera)
+        pinhole = Undistortion.of(recording.present.camera)
         views = [
             _view(recording, int(row), parent_T_link, meshes, pinhole)
             for row, parent_T_link in zip(rows, poses, strict=True)
@@ -126,8 +125,7 @@ def prepare(recording: Recording) -> tuple[PosedRobot, list[View]]:
 def _view(
     recording: Recording, row: int, parent_T_link: Array, meshes: dict[int, RenderMesh], pinhole: Undistortion
 ) -> View | None:
-    assert recording.joints_rad is not None
-    joints_rad = recording.joints_rad[row]
+    joints_rad = recording.present.joints_rad[row]
     has_image = recording.images is not None and recording.images[row] is not None
     has_mask = recording.masks is not None and recording.masks[row] is not None
     if not has_image and not has_mask:

@@ -42,11 +42,9 @@ class Silhouettes:
             poses = robot.link_poses(robot.joints_rad[self.samples])
         except InputError as error:
             raise Refusal(f"{recording.name}: {error}") from error
-        camera, meshes = recording.camera, meshes_by_level(robot.model)
-        assert camera is not None
+        camera, meshes = recording.present.camera, meshes_by_level(robot.model)
         self._parent_T_link = dict(zip(self.samples.tolist(), poses, strict=True))
         small = _shrunk(camera, shrink)
-        assert small.K is not None
         self._source, K, width, height = _canvas(small)
         mesh = meshes[max(level for level in meshes if level <= shrink)]
         self._renderer = Renderer(mesh, K, width, height)
@@ -63,8 +61,7 @@ class Silhouettes:
 
 
 def _shrunk(camera: CameraModel, shrink: int) -> CameraModel:
-    assert camera.K is not None
-    K = shrunk_intrinsics(camera.K, 1 / shrink)
+    K = shrunk_intrinsics(camera.intrinsics, 1 / shrink)
     return replace(camera, width=camera.width // shrink, height=camera.height // shrink, K=K)
 
 
@@ -74,19 +71,18 @@ def _canvas(camera: CameraModel) -> tuple[tuple[NDArray[np.intp], NDArray[np.int
     None instead of rows and columns when the image is the canvas. A barrel lens sees more than the pinhole of the same
     size: the canvas is as wide as needed, up to `_WIDEST`.
     """
-    assert camera.K is not None
     width, height = camera.width, camera.height
     if camera.is_pinhole:
-        return None, camera.K, width, height
+        return None, camera.intrinsics, width, height
     v, u = np.mgrid[0:height, 0:width].astype(float)
-    rays = np.stack([u, v, np.ones_like(u)], -1) @ np.linalg.inv(camera.K).T
-    ideal = undistort(rays[..., :2], camera) @ camera.K[:2, :2].T + camera.K[:2, 2]
+    rays = np.stack([u, v, np.ones_like(u)], -1) @ np.linalg.inv(camera.intrinsics).T
+    ideal = undistort(rays[..., :2], camera) @ camera.intrinsics[:2, :2].T + camera.intrinsics[:2, 2]
     ideal = np.nan_to_num(ideal, nan=np.inf)
     size = np.array([width, height])
     margin = (_WIDEST - 1) / 2 * size
     low = np.floor(np.maximum(ideal.min((0, 1)), -margin)).astype(int)
     high = np.ceil(np.minimum(ideal.max((0, 1)), size - 1 + margin)).astype(int)
     place = np.clip(np.rint(ideal), low, high).astype(int) - low
-    K = camera.K.copy()
+    K = camera.intrinsics.copy()
     K[:2, 2] -= low
     return (place[..., 1], place[..., 0]), K, int(high[0] - low[0] + 1), int(high[1] - low[1] + 1)
