@@ -58,7 +58,7 @@ def test_bench_seconds_per_thousand_iterations(name):
 
 def test_bench_guess_free_start():
     """The hemisphere of easyhecpp: seconds, and the overlap of drawing and mask that it finds."""
-    from hecbench_plugins.first_order.hemisphere import best_on_hemisphere
+    from hecbench_plugins.first_order.hemisphere import Hemisphere, best_on_hemisphere
     from hecbench_plugins.views.pyramid import prepare
 
     seconds, overlaps = [], []
@@ -66,7 +66,7 @@ def test_bench_guess_free_start():
         recording = synthetic.make("LP", index, 0)
         views = prepare(recording)[1]
         start = time.thread_time()
-        found = best_on_hemisphere(recording, views)
+        found = best_on_hemisphere(recording, views, Hemisphere())
         seconds.append(time.thread_time() - start)
         overlaps.append(found.overlap)
     print(

@@ -1,4 +1,4 @@
-"""Minimises the model of `bundle_model` and estimates the noise of its groups of observations.
+"""Minimises the model of `bundle.model` and estimates the noise of its groups of observations.
 
 Levenberg-Marquardt with the robot poses eliminated by the Schur complement; variance components after
 Foerstner 1979 as in Ulrich and Hillemann 2024, "Uncertainty-aware hand-eye calibration", T-RO, section V.
@@ -16,17 +16,51 @@ from hecbench.errors import SolverFailure
 from hecbench.estimate import Termination
 from hecbench.se3 import Array
 
-_CONVERGED_COST, _CONVERGED_STEP = 1e-12, 1e-11
-_LARGEST_DAMPING = 1e12
-_OUTER_ITERATIONS = 5
-_LEAST_REDUNDANCY = 10.0
-"""Below it a group's noise cannot be told from its observations, and the given value is kept."""
-_LARGEST_CHANGE = 4.0
-_CORRELATED = 2.5
-"""Ratio of variances that independent noise exceeds in one of hundreds of recordings of ten samples."""
-_SETTLED = 0.02
-_NOISE_FLOOR = np.array([0.02, np.deg2rad(0.002), 2e-5])
-"""px, rad, m: exact data must not make the weights infinite."""
+
+@dataclass(frozen=True)
+class DescentSettings:
+    """When Levenberg-Marquardt ends.
+
+    Attributes:
+        iterations: at most.
+        least_fall: of the cost, relative: near the rounding of double precision.
+        least_step: of every increment, rad and m.
+        first_damping, least_damping, largest_damping: times the diagonal; beyond the largest the descent has stalled.
+    """
+
+    iterations: int = 50
+    least_fall: float = 1e-12
+    least_step: float = 1e-11
+    first_damping: float = 1e-4
+    least_damping: float = 1e-12
+    largest_damping: float = 1e12
+
+
+@dataclass(frozen=True)
+class NoiseSettings:
+    """How the noise of a group of observations is estimated from its residuals.
+
+    Attributes:
+        rounds: of adjustment and estimation, at most.
+        least_redundancy: observations minus unknowns below which the given noise is kept: it is not determined.
+        largest_change: factor by which a noise may change in one round.
+        settled: relative change below which the rounds end.
+        correlated: ratio of variances that independent noise exceeds in one of hundreds of recordings of ten samples
+            (simulated).
+        floor_px, floor_rad, floor_m: exact data must not make the weights infinite; far below any device's noise.
+    """
+
+    rounds: int = 5
+    least_redundancy: float = 10.0
+    largest_change: float = 4.0
+    settled: float = 0.02
+    correlated: float = 2.5
+    floor_px: float = 0.02
+    floor_rad: float = float(np.deg2rad(0.002))
+    floor_m: float = 2e-5
+
+
+DESCENT, NOISE_ESTIMATION = DescentSettings(), NoiseSettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +83,7 @@ class Solution:
     iterations: int
 
 
-def adjust(problem: Problem, state: State, noise: Noise, *, max_iterations: int = 50) -> Solution:
+def adjust(problem: Problem, state: State, noise: Noise, settings: DescentSettings = DESCENT) -> Solution:
     """Levenberg-Marquardt from a state.
 
     Raises:
@@ -58,24 +92,24 @@ def adjust(problem: Problem, state: State, noise: Noise, *, max_iterations: int 
     at = linearise(problem, state, noise)
     if not np.isfinite(at.cost):
         raise SolverFailure("the start puts target points behind the camera: is the mounting right?")
-    damping, termination, iterations = 1e-4, Termination.MAX_ITERATIONS, 0
-    while iterations < max_iterations and termination is Termination.MAX_ITERATIONS:
+    damping, termination, iterations = settings.first_damping, Termination.MAX_ITERATIONS, 0
+    while iterations < settings.iterations and termination is Termination.MAX_ITERATIONS:
         iterations += 1
         shared, robot = _step(at, noise, damping)
         candidate = state.moved(shared, robot)
         there = linearise(problem, candidate, noise)
         if there.cost <= at.cost:
-            small = at.cost - there.cost <= _CONVERGED_COST * at.cost or (
-                max(np.abs(shared).max(), np.abs(robot).max()) < _CONVERGED_STEP
+            small = at.cost - there.cost <= settings.least_fall * at.cost or (
+                max(np.abs(shared).max(), np.abs(robot).max()) < settings.least_step
             )
-            state, at, damping = candidate, there, max(damping / 10, 1e-12)
+            state, at, damping = candidate, there, max(damping / 10, settings.least_damping)
             if small:
                 termination = Termination.CONVERGED
         else:
             damping *= 10
-            if damping > _LARGEST_DAMPING:
+            if damping > settings.largest_damping:
                 termination = Termination.STALLED
-            elif np.abs(shared).max() < _CONVERGED_STEP:
+            elif np.abs(shared).max() < settings.least_step:
                 termination = Termination.CONVERGED
     covariance, robot_covariances = _covariances(at, noise)
     redundancy = _redundancy(problem, at, noise, covariance, robot_covariances)
@@ -138,46 +172,51 @@ def _redundancy(
 
 
 def adjust_with_noise(
-    problem: Problem, state: State, noise: Noise, known: Sequence[bool] = (False, False, False)
+    problem: Problem,
+    state: State,
+    noise: Noise,
+    known: Sequence[bool] = (False, False, False),
+    settings: NoiseSettings = NOISE_ESTIMATION,
 ) -> Solution:
-    """`adjust`, with the noise of each group re-estimated from its residuals, at most five times.
+    """`adjust`, with the noise of each group re-estimated from its residuals.
 
-    A group (observed, rotation, translation) that is `known` or whose redundancy is below 10 keeps the given
-    noise; no change exceeds a factor of four at a time, and none goes below a floor far under any device's.
+    A group (observed, rotation, translation) that is `known` or whose redundancy is too small keeps the given
+    noise.
     """
     solution = adjust(problem, state, noise)
     iterations = solution.iterations
-    for _ in range(_OUTER_ITERATIONS):
+    floor = np.array([settings.floor_px, settings.floor_rad, settings.floor_m])
+    for _ in range(settings.rounds):
         old = np.array([solution.noise.observed, solution.noise.rotation_rad, solution.noise.translation_m])
-        free = ~np.asarray(known) & (solution.redundancy >= _LEAST_REDUNDANCY)
+        free = ~np.asarray(known) & (solution.redundancy >= settings.least_redundancy)
         factors = np.sqrt(solution.at.squares / np.where(free, solution.redundancy, 1.0))
-        factors[0] = np.sqrt(_observed_variance_factor(problem, solution))
-        factors = np.where(free, np.clip(factors, 1 / _LARGEST_CHANGE, _LARGEST_CHANGE), 1.0)
-        new = np.where(old > 0, np.maximum(old * factors, _NOISE_FLOOR), 0.0)
-        if (np.abs(new - old) <= _SETTLED * old).all():
+        factors[0] = np.sqrt(_observed_variance_factor(problem, solution, settings))
+        factors = np.where(free, np.clip(factors, 1 / settings.largest_change, settings.largest_change), 1.0)
+        new = np.where(old > 0, np.maximum(old * factors, floor), 0.0)
+        if (np.abs(new - old) <= settings.settled * old).all():
             break
         solution = adjust(problem, solution.state, Noise(*new.tolist()))
         iterations += solution.iterations
     return replace(solution, iterations=iterations)
 
 
-def _observed_variance_factor(problem: Problem, solution: Solution) -> float:
+def _observed_variance_factor(problem: Problem, solution: Solution, settings: NoiseSettings) -> float:
     """By how much the variance of an observed point is larger than assumed.
 
-    Only that part of a sample's residuals tells about X that a motion of the target would explain (6 numbers
+    Only that part of a sample's residuals matters for X that a motion of the target would explain (6 numbers
     each). A bent target or a wrong lens model errs alike in neighbouring points and puts more there than
     independent noise would; the rest, much more numerous, would then promise a precision that is not there.
     """
     squares, redundancy = solution.at.squares[0], solution.redundancy[0]
     within = problem.seen.sum() * problem.observed.shape[-1] - 6 * len(problem.observed)
     as_motion = redundancy - within
-    if min(within, as_motion) >= _LEAST_REDUNDANCY:
+    if min(within, as_motion) >= settings.least_redundancy:
         at = solution.at
         gradients = at.gradients[:, at.robot_columns]
         motions = np.linalg.pinv(at.mixed[:, at.robot_columns], hermitian=True) @ gradients[..., None]
         explained = float((gradients * motions[..., 0]).sum())
         factor_as_motion = explained / as_motion
         factor_within = (squares - explained) / within
-        if factor_as_motion > _CORRELATED * factor_within:
+        if factor_as_motion > settings.correlated * factor_within:
             return float(factor_as_motion)
     return float(squares / max(redundancy, 1.0))

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
-from hecbench.bundle.adjustment import adjust
+from hecbench.bundle.adjustment import DescentSettings, adjust
 from hecbench.bundle.model import Noise, Problem, State, linearise
 from hecbench.diagnose.fit import EXPLAINS, TYPICAL_NOISE, Fit, IdealCamera, hand_poses
 from hecbench.errors import SolverFailure
@@ -73,7 +73,7 @@ def calibrate(
     starts = list(_starts(problem, camera_T_target))
     for state in sorted(starts, key=lambda state: linearise(problem, state, noise).cost):
         with suppress(SolverFailure, np.linalg.LinAlgError):
-            solution = adjust(problem, state, noise, max_iterations=_ITERATIONS)
+            solution = adjust(problem, state, noise, DescentSettings(iterations=_ITERATIONS))
             found.append(Fit(problem, solution.state, focal_px))
             if found[-1].relative < EXPLAINS:
                 break

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hecbench.bundle.adjustment import Solution, adjust
+from hecbench.bundle.adjustment import DescentSettings, Solution, adjust
 from hecbench.bundle.model import Noise, Problem, start
 from hecbench.diagnose.calibrate import spread
 from hecbench.diagnose.case import Examination
@@ -112,6 +112,6 @@ def _adjusted(case: Examination, problem: Problem, noise: Noise) -> Solution | N
     assert case.solution is not None
     first = start(problem, case.solution.state.parent_T_camera, case.solution.state.carrier_T_target)
     try:
-        return adjust(problem, first, noise, max_iterations=25)
+        return adjust(problem, first, noise, DescentSettings(iterations=25))
     except (SolverFailure, np.linalg.LinAlgError):
         return None

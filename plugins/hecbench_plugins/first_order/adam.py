@@ -12,6 +12,7 @@ import numpy as np
 from hecbench.se3 import Array
 
 _BETAS, _EPSILON = (0.9, 0.999), 1e-8
+"""The defaults of the publication."""
 
 
 @dataclass

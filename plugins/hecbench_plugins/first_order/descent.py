@@ -1,4 +1,4 @@
-"""Adam on a pose, as the first-order methods run it, and what is told of a run."""
+"""Adam on a pose, as the first-order methods run it, and what is reported of a run."""
 
 from __future__ import annotations
 
@@ -23,7 +23,8 @@ from hecbench_plugins.second_order import evidence
 from hecbench_plugins.second_order.descent import Trace
 from hecbench_plugins.views.pyramid import View
 
-_TOLD_STEPS = 40
+_PATH_STEPS = 40
+"""Poses kept of a run for its figure."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +47,7 @@ class Verdict:
 
 
 Objective = Callable[[Sequence[Tensor], Array], Verdict]
-"""From the pictures (C, h, w) of every view's box and camera_T_parent. `Drawer.box` tells where the boxes are."""
+"""From the pictures (C, h, w) of every view's box and camera_T_parent. The boxes are in `Drawer.box`."""
 
 
 @dataclass(frozen=True)
@@ -77,11 +78,11 @@ class DescentHistory:
     path: list[tuple[str, Array, float]] = field(default_factory=list)
     _best_rank: tuple[int, float] = (0, np.inf)
 
-    def note(self, verdict: Verdict, told: bool) -> None:
-        """Count an iteration, keep its pose if it is the best so far, and in the path if it is `told`."""
+    def note(self, verdict: Verdict, in_path: bool) -> None:
+        """Count an iteration, keep its pose if it is the best so far, and in the path if asked."""
         self.loss = float(verdict.loss.detach())
         self.steps_by_stage[verdict.stage] = self.steps_by_stage.get(verdict.stage, 0) + 1
-        if told:
+        if in_path:
             self.path.append((verdict.stage, self.last, self.loss))
         if verdict.rank is not None and (-verdict.round, verdict.rank) < self._best_rank:
             self.best, self.best_iteration = self.last, self.iterations
@@ -92,7 +93,7 @@ class DescentHistory:
 def descend(
     drawers: Sequence[Drawer], numbers: PoseNumbers, objective: Objective, settings: AdamSettings
 ) -> DescentHistory:
-    """DescentHistory all iterations, or until the robot has left every picture.
+    """Run all iterations, or until the robot has left every picture.
 
     Raises:
         SolverFailure: the loss or its derivative is not finite.
@@ -105,7 +106,7 @@ def descend(
         torch.from_numpy(rotation.values).requires_grad_(),
     )
     run = DescentHistory(last=numbers.pose(translation.values, rotation.values))
-    every = max(1, settings.iterations // (_TOLD_STEPS - 2))
+    every = max(1, settings.iterations // (_PATH_STEPS - 2))
     turned = True
     with _one_thread():
         for iteration in range(settings.iterations):
@@ -114,7 +115,7 @@ def descend(
                 break
             verdict = objective(pictures, run.last)
             shift, turn = (slope.numpy() for slope in torch.autograd.grad(verdict.loss, leaves))
-            run.note(verdict, told=iteration % every == 0)
+            run.note(verdict, in_path=iteration % every == 0)
             _check(run, shift, turn)
             translation.step(shift)
             if verdict.turns:
@@ -162,13 +163,13 @@ def answer(
     """The estimate of a run: its answer is `pose`, camera_T_parent, the last iterate or the best.
 
     A run that ended with the robot outside every picture has no answer, whatever it passed on its way. Its path is
-    told all the same.
+    kept all the same.
     """
-    told = {
+    details = {
         "in_frame": run.in_frame,
         "loss": run.loss,
         "steps_by_stage": run.steps_by_stage,
-        "path": evidence.told_path(run.path),
+        "path": evidence.path_json(run.path),
         **diagnostics,
     }
     renders = (run.iterations + 1) * len(drawers)
@@ -183,16 +184,16 @@ def answer(
             termination=Termination.OUT_OF_FRAME,
             iterations=run.iterations,
             renders=renders,
-            diagnostics=told,
+            diagnostics=details,
         )
-    told["overlap"] = evidence.overlap(views, pose, Trace())
+    details["overlap"] = evidence.overlap(views, pose, Trace())
     if pose is run.best:
-        told["best_iteration"] = run.best_iteration
-        told["last_parent_T_camera"] = se3.inverse(run.last)
+        details["best_iteration"] = run.best_iteration
+        details["last_parent_T_camera"] = se3.inverse(run.last)
     return Estimate(
         se3.inverse(pose),
         termination=Termination.MAX_ITERATIONS,
         iterations=run.iterations,
         renders=renders,
-        diagnostics=told,
+        diagnostics=details,
     )

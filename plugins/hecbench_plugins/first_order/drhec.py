@@ -38,11 +38,6 @@ from hecbench_plugins.first_order.poses import EulerAngles, Increment, PoseNumbe
 from hecbench_plugins.first_order.simlike import cut_out, why_not_simulated
 from hecbench_plugins.views.pyramid import Picture, View, prepare
 
-_RATE = 2e-3
-_REFERENCE_WIDTH_PX = 640
-_LEAVE_FINE = 2.0
-"""Times the threshold: beyond it a resolved run goes back to the coarse stage."""
-_TRANSLATE_EVERY = 100
 _COVERAGE = 3
 """The channel of a drawn picture that holds the robot's mask."""
 
@@ -78,6 +73,10 @@ class DRHeC:
         iterations: of Adam.
         translator: name of the plugin that makes the recording's pictures look simulated.
         backend: which renderer draws.
+        rate: of Adam, advanced.
+        leave_fine: times the threshold; beyond it a resolved run goes back to the coarse stage. Advanced.
+        reference_width_px: the width for which the weights were published, advanced.
+        translate_every: iterations after which a translator that follows the pose is asked again, advanced.
     """
 
     losses: Losses = Losses.FULL
@@ -88,6 +87,10 @@ class DRHeC:
     iterations: int = 2000
     translator: str = "identity"
     backend: Backend = "cpu"
+    rate: float = 2e-3
+    leave_fine: float = 2.0
+    reference_width_px: int = 640
+    translate_every: int = 100
 
     def __call__(self, recording: Recording, *, rng: np.random.Generator) -> Estimate:
         """Calibrate from the recording's start."""
@@ -106,22 +109,22 @@ class DRHeC:
         colours[:-1] = np.c_[mesh.colours, np.ones(len(mesh.colours))]
         drawers = [drawer(self.backend, (mesh,), colours, view) for view in views]
         objective = _Objective(self, translator, views, drawers)
-        settings = AdamSettings(self.iterations, _RATE, freeze_by_zero=literal)
+        settings = AdamSettings(self.iterations, self.rate, freeze_by_zero=literal)
         run = descend(drawers, numbers, objective, settings)
         pose = run.last if literal or run.best is None else run.best
-        return answer(run, views, drawers, pose, self._told(run, views, pose, objective))
+        return answer(run, views, drawers, pose, self._details(run, views, pose, objective))
 
-    def _told(
+    def _details(
         self, run: DescentHistory, views: Sequence[View], pose: Array, objective: _Objective
     ) -> dict[str, Any]:
-        told: dict[str, Any] = {
+        details: dict[str, Any] = {
             "variant": str(self.variant),
             "translator": self.translator,
             "centroid_px": objective.centroid_px,
         }
         if self.translator == "identity" and (why := why_not_simulated(views, pose)):
-            told["not_as_published"] = f"{why}, and no translator made the pictures look simulated"
-        return told
+            details["not_as_published"] = f"{why}, and no translator made the pictures look simulated"
+        return details
 
 
 class _Objective:
@@ -138,15 +141,15 @@ class _Objective:
         self._calls, self._fine = 0, False
         width = drawers[0].width
         self._per_value = 1 / (3 * width * drawers[0].height)
-        self._scale = _REFERENCE_WIDTH_PX / width if method.variant is Variant.RESOLVED else 1.0
+        self._scale = method.reference_width_px / width if method.variant is Variant.RESOLVED else 1.0
 
     def __call__(self, pictures: Sequence[Tensor], camera_T_parent: Array) -> Verdict:
-        if self._calls == 0 or (self._follows and self._calls % _TRANSLATE_EVERY == 0):
+        if self._calls == 0 or (self._follows and self._calls % self._method.translate_every == 0):
             self._colour = [
                 SquaredError(_translated(self._translate, view, camera_T_parent), at)
                 for view, at in zip(self._views, self._drawers, strict=True)
             ]
-        turn = self._calls // _TRANSLATE_EVERY if self._follows else 0
+        turn = self._calls // self._method.translate_every if self._follows else 0
         self._calls += 1
         rgb = self._per_value * _mean(
             [colour(picture) for colour, picture in zip(self._colour, pictures, strict=True)]
@@ -176,7 +179,7 @@ class _Objective:
         elif limit == 0:
             return "one stage", True
         else:
-            self._fine = centroid <= (_LEAVE_FINE * limit if self._fine else limit)
+            self._fine = centroid <= (self._method.leave_fine * limit if self._fine else limit)
         return ("fine", True) if self._fine else ("coarse", False)
 
 

@@ -20,12 +20,24 @@ from hecbench_plugins.second_order.descent import Trace, draw_counted
 from hecbench_plugins.second_order.silhouette import centroid_and_area
 from hecbench_plugins.views.pyramid import View
 
-DIRECTIONS = 500
-_FIRST_DISTANCE_M = 2.0
-_ROUNDS = 3
-_LEVEL = 4
-_HIGHEST = 0.98
-"""Sine of the elevation up to which "upright" says how a camera is turned."""
+
+@dataclass(frozen=True)
+class Hemisphere:
+    """The cameras to try; all numbers are chosen here.
+
+    Attributes:
+        directions: how many.
+        first_distance_m: from the robot's middle, before centroid and area correct it.
+        corrections: of distance and aim for each direction.
+        level: the pictures are shrunk by this factor.
+        highest_sine: of the elevation, up to which "upright" says how a camera is turned.
+    """
+
+    directions: int = 500
+    first_distance_m: float = 2.0
+    corrections: int = 3
+    level: int = 4
+    highest_sine: float = 0.98
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,8 +49,10 @@ class HemisphereStart:
     candidates: int
 
 
-def best_on_hemisphere(recording: Recording, views: Sequence[View]) -> HemisphereStart:
-    """Try every direction at a quarter of the pictures' size.
+def best_on_hemisphere(
+    recording: Recording, views: Sequence[View], hemisphere: Hemisphere
+) -> HemisphereStart:
+    """Try every direction in shrunk pictures.
 
     Raises:
         Refusal: the camera sits on the robot, so that no hemisphere around the base holds it.
@@ -47,37 +61,28 @@ def best_on_hemisphere(recording: Recording, views: Sequence[View]) -> Hemispher
         raise Refusal("cameras are sampled around the base: a start can be searched for eye_to_hand only")
     middle = np.concatenate([view.parent_T_link[:, :3, 3] for view in views]).mean(0)
     best, best_overlap, trace = np.eye(4), -1.0, Trace()
-    for direction in _directions():
-        pose = _looking_at(middle, direction)
-        pose = centroid_and_area(views, pose, trace, rounds=_ROUNDS)
-        overlap = _overlap(views, pose, trace)
+    for direction in _directions(hemisphere):
+        pose = se3.inverse(se3.looking(middle + hemisphere.first_distance_m * direction, middle))
+        pose = centroid_and_area(views, pose, trace, rounds=hemisphere.corrections)
+        overlap = _overlap(views, hemisphere.level, pose, trace)
         if overlap > best_overlap:
             best, best_overlap = pose, overlap
-    return HemisphereStart(best, best_overlap, DIRECTIONS)
+    return HemisphereStart(best, best_overlap, hemisphere.directions)
 
 
-def _directions() -> Array:
-    """Unit vectors (DIRECTIONS, 3) from the robot to the camera, even in the sine of the elevation."""
-    n = np.arange(DIRECTIONS)
-    sine = _HIGHEST * (n + 0.5) / DIRECTIONS
+def _directions(hemisphere: Hemisphere) -> Array:
+    """Unit vectors (D, 3) from the robot to the camera, even in the sine of the elevation."""
+    n = np.arange(hemisphere.directions)
+    sine = hemisphere.highest_sine * (n + 0.5) / hemisphere.directions
     azimuth = n * np.pi * (3 - np.sqrt(5))
     cosine = np.sqrt(1 - sine**2)
     return np.stack([cosine * np.cos(azimuth), cosine * np.sin(azimuth), sine], -1)
 
 
-def _looking_at(middle: Array, direction: Array) -> Array:
-    """camera_T_parent of an upright camera that looks at `middle`."""
-    right = np.cross(-direction, [0, 0, 1])
-    right /= np.linalg.norm(right)
-    camera_R_parent = np.stack([right, np.cross(-direction, right), -direction])
-    eye = middle + _FIRST_DISTANCE_M * direction
-    return se3.make(camera_R_parent, -camera_R_parent @ eye)
-
-
-def _overlap(views: Sequence[View], pose: Array, trace: Trace) -> float:
+def _overlap(views: Sequence[View], level: int, pose: Array, trace: Trace) -> float:
     values = []
     for view in views:
-        at = draw_counted(view, _LEVEL, pose, trace)
+        at = draw_counted(view, level, pose, trace)
         drawn, seen = at.drawn(), at.observed[..., 3] > 0.5
         values.append((drawn & seen).sum() / max((drawn | seen).sum(), 1))
     return float(np.mean(values))

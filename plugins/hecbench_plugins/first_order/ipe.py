@@ -32,9 +32,6 @@ from hecbench_plugins.first_order.masks import mask_drawers, mask_of
 from hecbench_plugins.first_order.poses import Increment, PoseNumbers
 from hecbench_plugins.views.pyramid import Picture, prepare
 
-_RATE = 2e-3
-_APPEARANCE_WEIGHTS = 1e-3, 1.0
-
 
 @dataclass(frozen=True)
 class IPE:
@@ -44,11 +41,15 @@ class IPE:
         gamma: px that the distances are divided by; None: half the picture's diagonal.
         iterations: of Adam.
         backend: which renderer draws.
+        rate: of Adam, advanced.
+        appearance_weights: the range of w3, advanced.
     """
 
     gamma: float | None = None
     iterations: int = 2000
     backend: Backend = "cpu"
+    rate: float = 2e-3
+    appearance_weights: tuple[float, float] = (1e-3, 1.0)
 
     def __call__(self, recording: Recording, *, rng: np.random.Generator) -> Estimate:
         """Calibrate from the recording's start."""
@@ -58,8 +59,8 @@ class IPE:
         robot.check_start(recording)
         drawers = mask_drawers(robot.model, views, "zbuffered", self.backend)
         numbers = Increment(se3.inverse(recording.initial_parent_T_camera))
-        losses = _Losses([mask_of(view) for view in views], drawers, numbers, self.gamma)
-        run = descend(drawers, numbers, losses, AdamSettings(self.iterations, _RATE))
+        losses = _Losses([mask_of(view) for view in views], drawers, numbers, self)
+        run = descend(drawers, numbers, losses, AdamSettings(self.iterations, self.rate))
         weights = None if losses.weights is None else losses.weights.tolist()
         return answer(run, views, drawers, run.last, {"weights": weights})
 
@@ -72,13 +73,14 @@ class _Losses:
         masks: Sequence[Picture],
         drawers: Sequence[Drawer],
         numbers: PoseNumbers,
-        gamma: float | None,
+        method: IPE,
     ) -> None:
         self.weights: Array | None = None
         self._drawers, self._numbers = drawers, numbers
+        self._appearance_weights = method.appearance_weights
         self._errors = [SquaredError(mask[None], at) for mask, at in zip(masks, drawers, strict=True)]
         self._pixels = [float(mask.sum(dtype=float)) for mask in masks]
-        self._distances = [_distance(mask, gamma) for mask in masks]
+        self._distances = [_distance(mask, method.gamma) for mask in masks]
 
     def __call__(self, pictures: Sequence[Tensor], camera_T_parent: Array) -> Verdict:
         views = zip(pictures, self._errors, self._pixels, self._drawers, self._distances, strict=True)
@@ -99,7 +101,7 @@ class _Losses:
     def _balanced(self, losses: Sequence[Tensor], pictures: Sequence[Tensor]) -> Array:
         mask, distance, appearance = (self._steepness(loss, pictures) for loss in losses)
         typical = float(np.mean([float(one[one > 0].mean()) for one in self._distances]))
-        low, high = _APPEARANCE_WEIGHTS
+        low, high = self._appearance_weights
         return np.array(
             [
                 1.0,

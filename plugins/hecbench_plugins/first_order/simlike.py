@@ -10,10 +10,15 @@ from hecbench.se3 import Array
 from hecbench_plugins.views.pyramid import Picture, View
 
 _BLACK = 0.02
+"""Of full brightness: darker is black, with the noise of a dark sensor."""
 _SOFT_EDGE_PX = 2
+"""Width of the blur at the robot's edge."""
 _OTHER_COLOUR = 0.05
+"""Of full brightness: a part that differs more from its model is not as the renderer draws it."""
 _FEWEST_PIXELS = 50
+"""Of a part whose median colour is compared."""
 _GOOD_OVERLAP = 0.8
+"""Of drawing and mask; below it the colours are not those of the same parts."""
 
 
 def on_black(view: View) -> bool:
@@ -39,7 +44,7 @@ def cut_out(view: View) -> tuple[Picture, Picture]:
 
 
 def why_not_simulated(views: Sequence[View], camera_T_parent: Array) -> str | None:
-    """What tells the pictures from the renderer's own; None: nothing does.
+    """How the pictures differ from the renderer's own; None: they do not.
 
     Colours are compared only where the drawing at the pose overlaps the mask well.
     """

@@ -24,9 +24,11 @@ from hecbench_plugins.markers.target_poses import planar_candidates
 DEFAULT_NOISE = Noise(0.3, float(np.deg2rad(0.05)), 5e-4)
 """A corner, and a good arm: px, rad, m."""
 _STARTS = 2
+"""Descents, from the starts with the least residuals."""
 _MOST_VOTES = 400
 """Poses compared each with each."""
 _AGREEING_RAD = np.deg2rad(8.0)
+"""Between turns of the target that agree: PnP of a small target is off by degrees, a mirrored pose by tens."""
 
 
 def corner_problem(recording: Recording, prior_sigmas: Array | None = None) -> Problem:

@@ -23,11 +23,26 @@ from hecbench_plugins.markers.hand_eye import MINIMUM_ROTATION_DEG, posed_sample
 
 COPLANAR_CONDITION = 300.0
 """Above it the marker positions nearly lie in a plane and the closed form is off by decimetres; healthy is 5."""
-_MAX_ITERATIONS = 100
-_CONVERGED_STEP = 1e-11
-_ROUNDING = 1e-13
 _MOST_COMPARED = 400
 """Samples compared each with each."""
+
+
+@dataclass(frozen=True)
+class DescentSettings:
+    """When the Gauss-Newton descent ends.
+
+    Attributes:
+        iterations: at most.
+        least_step_rad: length of a step below which it has converged.
+        rounding: relative rise of the cost that is rounding, no reason to halve a step.
+    """
+
+    iterations: int = 100
+    least_step_rad: float = 1e-11
+    rounding: float = 1e-13
+
+
+DESCENT = DescentSettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,18 +166,18 @@ def _cost(e: Eliminated, rotation: Array) -> float:
     return float(columns @ e.A @ columns - 2 * e.b @ columns)
 
 
-def _descend(e: Eliminated, rotation: Array) -> tuple[Array, int]:
+def _descend(e: Eliminated, rotation: Array, settings: DescentSettings = DESCENT) -> tuple[Array, int]:
     """Gauss-Newton from a start; a step that would raise the cost, beyond rounding, is halved."""
-    for iteration in range(1, _MAX_ITERATIONS + 1):
+    for iteration in range(1, settings.iterations + 1):
         F = np.stack([_vec(rotation @ generator) for generator in se3.hat(np.eye(3))], 1)
         step = np.linalg.lstsq(F.T @ e.A @ F, F.T @ (e.b - e.A @ _vec(rotation)), rcond=None)[0]
         here = _cost(e, rotation)
-        while _cost(e, rotation @ se3.so3_exp(step)) > here + _ROUNDING * abs(here):
+        while _cost(e, rotation @ se3.so3_exp(step)) > here + settings.rounding * abs(here):
             step = step / 2
         rotation = se3.nearest_rotation(rotation @ se3.so3_exp(step))
-        if np.linalg.norm(step) < _CONVERGED_STEP:
+        if np.linalg.norm(step) < settings.least_step_rad:
             return rotation, iteration
-    return rotation, _MAX_ITERATIONS
+    return rotation, settings.iterations
 
 
 def answer(

@@ -98,7 +98,7 @@ def answer(
     diagnostics["weakest_direction"] = [round(float(part), 3) for part in directions[:, 0]]
     parent_T_root = views[0].parent_T_link[0]
     other_side = parent_T_root @ _HALF_TURN @ se3.inverse(parent_T_root)
-    diagnostics["path"] = told_path(trace.poses)
+    diagnostics["path"] = path_json(trace.poses)
     diagnostics["overlap_from_the_other_side"] = overlap(views[:1], camera_T_parent @ other_side, trace)
     return Estimate(
         parent_T_camera,
@@ -117,7 +117,7 @@ def _disagreement(end: FinalStage) -> Array:
     return np.asarray(sum((np.outer(move, move) for move in moves), np.zeros((6, 6))))
 
 
-def told_path(steps: list[tuple[str, Array, float]]) -> list[list[Any]]:
+def path_json(steps: list[tuple[str, Array, float]]) -> list[list[Any]]:
     """Stage, cost and log of parent_T_camera of at most `_PATH_STEPS` of the steps, the first and last among them."""
     kept = np.round(np.linspace(0, len(steps) - 1, min(_PATH_STEPS, len(steps)))).astype(int)
     return [

@@ -29,7 +29,9 @@ from hecbench_plugins.markers.hand_eye import (
 )
 
 _ITERATIONS = 50
+"""Of the descent, at most."""
 _CONVERGED_STEP = 1e-12
+"""Length of a step, in units of the dual quaternion."""
 
 
 class Method(StrEnum):
