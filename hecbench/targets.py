@@ -127,6 +127,118 @@ class AprilTagTarget(Target):
         return np.array([[-half, half, 0], [half, half, 0], [half, -half, 0], [-half, -half, 0]])
 
 
+class MarkersTarget(Target):
+    """Square markers of a dictionary, with four points each, in the order of their ids from `first_id` on."""
+
+    dictionary: str
+    first_id: int
+
+    @property
+    def marker_count(self) -> int:
+        """How many markers there are."""
+        return len(self.points_m) // 4
+
+
+@dataclass(frozen=True)
+class ArucoTarget(MarkersTarget):
+    """One ArUco marker: x right, y up, z towards the viewer; corners from top-left, clockwise, as OpenCV lists them.
+
+    `size_m` is the side of the black square.
+    """
+
+    kind: ClassVar[str] = "aruco"
+    dictionary: str
+    id: int
+    size_m: float
+
+    def __post_init__(self) -> None:
+        _id("id", self.id)
+        _positive("size_m", self.size_m)
+
+    @property
+    def first_id(self) -> int:  # type: ignore[override]
+        """The marker's id."""
+        return self.id
+
+    @cached_property
+    def points_m(self) -> Array:
+        """(4, 3) m in the marker's frame."""
+        half = self.size_m / 2
+        return np.array([[-half, half, 0], [half, half, 0], [half, -half, 0], [-half, -half, 0]])
+
+
+@dataclass(frozen=True)
+class ArucoGridTarget(MarkersTarget):
+    """OpenCV's GridBoard: ids row by row from the top left, x right, y down, z into the board, origin at its corner.
+
+    `marker_m` is the side of a black square, `gap_m` the white between two. Each marker has its corners from top-left,
+    clockwise.
+    """
+
+    kind: ClassVar[str] = "aruco_grid"
+    columns: int
+    rows: int
+    marker_m: float
+    gap_m: float
+    dictionary: str
+    first_id: int = 0
+
+    def __post_init__(self) -> None:
+        _marker_grid(self.columns, self.rows)
+        _positive("marker_m", self.marker_m)
+        _positive("gap_m", self.gap_m)
+        _id("first_id", self.first_id)
+
+    @cached_property
+    def points_m(self) -> Array:
+        """(4 columns rows, 3) m in the board's frame."""
+        corners = (
+            np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]]) * self.marker_m
+        )
+        places = _grid(self.columns, self.rows, self.marker_m + self.gap_m)
+        return (places[:, None] + corners).reshape(-1, 3)
+
+
+@dataclass(frozen=True)
+class AprilGridTarget(MarkersTarget):
+    """Kalibr's grid of AprilTags: ids row by row from the bottom left, x right, y up, origin at its corner.
+
+    `tag_m` is the side of a black square, `spacing` the white between two over it, as Kalibr's `tagSize` and
+    `tagSpacing`. Each tag has its corners from bottom-left, counter-clockwise.
+    """
+
+    kind: ClassVar[str] = "aprilgrid"
+    columns: int
+    rows: int
+    tag_m: float
+    spacing: float
+    family: str = "tag36h11"
+    first_id: int = 0
+
+    def __post_init__(self) -> None:
+        _marker_grid(self.columns, self.rows)
+        _positive("tag_m", self.tag_m)
+        if not (np.isfinite(self.spacing) and 0 < self.spacing < 10):
+            raise InputError(
+                f"target.spacing: {self.spacing} is not the ratio of the white between two tags to a tag, as 0.3"
+            )
+        _id("first_id", self.first_id)
+        if not self.family.startswith("tag"):
+            raise InputError(f"target.family: '{self.family}' is not a tag family; use tag36h11")
+
+    @property
+    def dictionary(self) -> str:  # type: ignore[override]
+        """The family as OpenCV names it."""
+        return f"APRILTAG_{self.family.removeprefix('tag')}"
+
+    @cached_property
+    def points_m(self) -> Array:
+        """(4 columns rows, 3) m in the grid's frame."""
+        corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]]) * self.tag_m
+        places = _grid(self.columns, self.rows, self.tag_m * (1 + self.spacing))
+        return (places[:, None] + corners).reshape(-1, 3)
+
+
 def grid_shape(points_m: Array) -> tuple[int, int] | None:
     """(columns, rows) of points (P, 3) m that form a grid row by row, x along the columns, z = 0."""
     if len(points_m) < 4 or points_m[:, 2].any():
@@ -149,6 +261,17 @@ def _grid(columns: int, rows: int, spacing_m: float) -> Array:
 def _positive(name: str, value: float) -> None:
     if not (np.isfinite(value) and value > 0):
         raise InputError(f"target.{name}: {value} is not a positive length in metres")
+
+
+def _id(name: str, value: int) -> None:
+    if value < 0:
+        raise InputError(f"target.{name}: {value} is negative; ids begin at 0")
+
+
+def _marker_grid(columns: int, rows: int) -> None:
+    for name, value in (("columns", columns), ("rows", rows)):
+        if not 1 <= value <= _LARGEST_GRID:
+            raise InputError(f"target.{name}: {value} is not within 1 to {_LARGEST_GRID}")
 
 
 def _grid_size(name: str, value: int) -> None:

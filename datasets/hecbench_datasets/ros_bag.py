@@ -27,12 +27,12 @@ from hecbench.se3 import Array
 from hecbench.specs import DatasetSpec
 from hecbench.storage.recording_io import encode_png
 from hecbench.system import files
-from hecbench_datasets.reading import bags
+from hecbench_datasets.reading import bags, kalibr
 from hecbench_datasets.reading.hints import Hints, hinted_target, hints_for
 from hecbench_datasets.reading.joint_poses import BASES, FLANGES, joint_readings
 from hecbench_datasets.reading.pictured_proof import Way, settled
 from hecbench_datasets.reading.seen_targets import seen_target
-from hecbench_datasets.reading.sources import foreign
+from hecbench_datasets.reading.sources import YAML_SUFFIXES, files_in, foreign
 from hecbench_datasets.reading.stills import offset_by_change_s, still_moments
 from hecbench_datasets.reading.transforms import Transforms
 
@@ -76,6 +76,10 @@ def load(path: Path) -> Recording:
             f"{path}: {why}: they are calibrated from the pictures; or write camera into {HINTS_NAME}"
         )
     target = hinted_target(hints, hints_file)
+    beside = files_in(path if path.is_dir() else path.parent, *YAML_SUFFIXES)
+    if target is None and (described := kalibr.target_in(beside)) is not None:
+        target = described[0]
+        notes.append(f"{path}: target from {described[1].name}")
     if target is None and hints.mounting is None:
         raise InputError(
             f"{path}: {len(images)} still moments seen in {topic}; {seen_target(images)} into {hints_file}, or "

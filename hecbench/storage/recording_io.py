@@ -18,7 +18,16 @@ from hecbench.lens import OPENCV, CameraModel
 from hecbench.recording import ImageSource, Mounting, Recording, RobotDescription
 from hecbench.robots import urdf_files
 from hecbench.system import files, pictures
-from hecbench.targets import AprilTagTarget, CharucoTarget, ChessboardTarget, PointsTarget, Target
+from hecbench.targets import (
+    AprilGridTarget,
+    AprilTagTarget,
+    ArucoGridTarget,
+    ArucoTarget,
+    CharucoTarget,
+    ChessboardTarget,
+    PointsTarget,
+    Target,
+)
 
 SCHEMA = "hecbench.recording/1"
 FILE_NAME = "recording.json"
@@ -73,6 +82,33 @@ class _AprilTag(_Strict, tag_field="kind", tag="apriltag"):
     size_m: float
 
 
+class _Aruco(_Strict, tag_field="kind", tag="aruco"):
+    dictionary: str
+    id: Count
+    size_m: float
+
+
+class _ArucoGrid(_Strict, tag_field="kind", tag="aruco_grid"):
+    columns: Count
+    rows: Count
+    marker_m: float
+    gap_m: float
+    dictionary: str
+    first_id: Count = 0
+
+
+class _AprilGrid(_Strict, tag_field="kind", tag="aprilgrid"):
+    columns: Count
+    rows: Count
+    tag_m: float
+    spacing: float
+    family: str = "tag36h11"
+    first_id: Count = 0
+
+
+_Target = _Points | _Chessboard | _Charuco | _AprilTag | _Aruco | _ArucoGrid | _AprilGrid
+
+
 class _Sample(_Strict):
     id: str
     robot_stamp_s: float | None = None
@@ -92,7 +128,7 @@ class _Recording(_Strict):
     samples: list[_Sample]
     robot: _Robot | None = None
     camera: _Camera | None = None
-    target: _Points | _Chessboard | _Charuco | _AprilTag | None = None
+    target: _Target | None = None
     initial_parent_T_camera: Matrix | None = None
     truth_parent_T_camera: Matrix | None = None
 
@@ -178,7 +214,7 @@ def _camera(parsed: _Camera | None) -> CameraModel | None:
     return CameraModel(parsed.width, parsed.height, K, distortion, parsed.distortion_model)
 
 
-def _target(parsed: _Points | _Chessboard | _Charuco | _AprilTag | None) -> Target | None:
+def _target(parsed: _Target | None) -> Target | None:
     match parsed:
         case None:
             return None
@@ -191,6 +227,14 @@ def _target(parsed: _Points | _Chessboard | _Charuco | _AprilTag | None) -> Targ
             return CharucoTarget(*sizes, parsed.dictionary, bool(parsed.legacy))
         case _AprilTag():
             return AprilTagTarget(parsed.family, parsed.id, parsed.size_m)
+        case _Aruco():
+            return ArucoTarget(parsed.dictionary, parsed.id, parsed.size_m)
+        case _ArucoGrid():
+            lengths = parsed.marker_m, parsed.gap_m
+            return ArucoGridTarget(parsed.columns, parsed.rows, *lengths, parsed.dictionary, parsed.first_id)
+        case _AprilGrid():
+            lengths = parsed.tag_m, parsed.spacing
+            return AprilGridTarget(parsed.columns, parsed.rows, *lengths, parsed.family, parsed.first_id)
 
 
 def _array(name: str, value: Any) -> NDArray[np.float64]:

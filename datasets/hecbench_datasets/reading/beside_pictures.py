@@ -14,6 +14,7 @@ from hecbench.exchange.conventions import HINTS_NAME
 from hecbench.exchange.pose_numbers import readings
 from hecbench.recording import CameraModel, Mounting, Recording
 from hecbench.system import pictures
+from hecbench_datasets.reading import kalibr
 from hecbench_datasets.reading.cameras import camera_in
 from hecbench_datasets.reading.columns import Columns, Poses
 from hecbench_datasets.reading.hints import Hints, hinted_target
@@ -51,6 +52,9 @@ def load_beside_pictures(
     beside = _paired(found, stream, poses, hints)
     camera, notes = _camera(found, beside.images[0], hints)
     target = hinted_target(hints, file)
+    if target is None and (described := kalibr.target_in(found.files)) is not None:
+        target = described[0]
+        notes.append(f"{found.path}: target from {described[1].name}")
     robots = _robots(found, hints)
     told = hints.mounting is not None and (hints.robot_rotation is not None or _is_matrix(poses))
     if target is None and not told:
@@ -172,12 +176,8 @@ def _ids(images: Sequence[Path], path: Path) -> tuple[str, ...]:
 def _camera(found: Survey, picture: Path, hints: Hints) -> tuple[CameraModel | None, list[str]]:
     if hints.camera is not None:
         return hints.camera_model(), []
-    folder = found.path if found.path.is_dir() else found.path.parent
-    camera = camera_in(found.files, picture)
-    if camera is None:
-        pictures.size(picture)
-        return None, []
-    return camera[0], [f"{folder}: intrinsics from {camera[1].name}"]
+    pictures.size(picture)
+    return camera_in(found.files, picture)
 
 
 def _robots(found: Survey, hints: Hints) -> list[str | Path]:

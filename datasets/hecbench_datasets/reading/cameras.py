@@ -1,4 +1,4 @@
-"""Intrinsics in files that people keep beside their pictures: camera_info, OpenCV's YAML, JSON, NPZ, K.txt."""
+"""Intrinsics in files that people keep beside their pictures: camera_info, Kalibr, OpenCV's YAML, JSON, NPZ, K.txt."""
 
 from __future__ import annotations
 
@@ -10,33 +10,37 @@ from typing import Any
 import numpy as np
 
 from hecbench.errors import InputError
-from hecbench.recording import CameraModel
+from hecbench.lens import EQUIDISTANT, OPENCV, CameraModel
 from hecbench.se3 import Array
 from hecbench.system import pictures
+from hecbench_datasets.reading import kalibr
 from hecbench_datasets.reading.sources import YAML_SUFFIXES, json_value, text, yaml_value
 from hecbench_datasets.reading.tables import numpy_arrays
 
-_FILE = re.compile(r"intrinsic|camera|calib|^k$|param|config|settings|_k$|mtx", re.IGNORECASE)
+_FILE = re.compile(r"intrinsic|cam|calib|^k$|param|config|settings|_k$|mtx", re.IGNORECASE)
 _SUFFIXES = (".json", ".txt", ".npz", ".npy", ".csv", *YAML_SUFFIXES)
 _MATRIX = re.compile(
     r"^(k|mtx|(\w*_)?(camera_?matrix|intrinsics?|intrinsic_?matrix|cam_?k|camera_?k|k_?matrix))$"
 )
 _DISTORTION = re.compile(r"^(d|dist|(\w*_)?(dist_?coeffs?|distortion\w*|dist_?coefficients))$")
+_FISHEYE = ("equidistant", "fisheye", "kannala_brandt4", "kannala_brandt", "opencv_fisheye")
 _SIZE = (re.compile(r"^(image_?)?width|^w$|^cols$"), re.compile(r"^(image_?)?height|^h$|^rows$"))
 
 
-def camera_in(files: list[Path], picture: Path) -> tuple[CameraModel, Path] | None:
-    """The camera of the first file that has intrinsics in px of such pictures, and that file."""
+def camera_in(files: list[Path], picture: Path) -> tuple[CameraModel | None, list[str]]:
+    """The camera of the first file with intrinsics in px of such pictures, and notes: that file, or why one is not."""
+    passed = []
     for file in files:
         if file.suffix.lower() not in _SUFFIXES or not _FILE.search(file.stem):
             continue
         try:
             camera = camera_of(_content(file), pictures.size(picture))
-        except InputError:
+        except InputError as error:
+            passed.append(f"{file.parent}: {file.name} is not used: {error}")
             continue
         if camera is not None:
-            return camera, file
-    return None
+            return camera, [f"{file.parent}: intrinsics from {file.name}"]
+    return None, passed
 
 
 def camera_of(content: Any, size: tuple[int, int]) -> CameraModel | None:
@@ -46,6 +50,8 @@ def camera_of(content: Any, size: tuple[int, int]) -> CameraModel | None:
         content: with K (or fx, fy, cx, cy), distortion, width and height under any of their usual names.
         size: width and height in px, where the content has none.
     """
+    if (of_kalibr := kalibr.camera(content, size)) is not None:
+        return of_kalibr
     named = list(_named(content))
     K = next((m for key, value in named if _MATRIX.match(key) and (m := _matrix(value)) is not None), None)
     if K is None:
@@ -65,7 +71,9 @@ def camera_of(content: Any, size: tuple[int, int]) -> CameraModel | None:
     )
     if (width, height) != size:
         raise InputError(f"its intrinsics are of {width}x{height} px, the pictures have {size[0]}x{size[1]}")
-    return CameraModel(width, height, K, lens)
+    model = next((value for key, value in named if key in ("distortion_model", "lens_model")), None)
+    fisheye = isinstance(model, str) and model.lower() in _FISHEYE
+    return CameraModel(width, height, K, lens[:4] if fisheye else lens, EQUIDISTANT if fisheye else OPENCV)
 
 
 def _content(file: Path) -> Any:

@@ -10,9 +10,21 @@ import numpy as np
 
 from hecbench.errors import InputError
 from hecbench.exchange.conventions import HINTS_NAME
-from hecbench.recording import CameraModel, Mounting
-from hecbench.targets import AprilTagTarget, CharucoTarget, ChessboardTarget, PointsTarget, Target
+from hecbench.lens import OPENCV, CameraModel
+from hecbench.recording import Mounting
+from hecbench.targets import (
+    AprilGridTarget,
+    AprilTagTarget,
+    ArucoGridTarget,
+    ArucoTarget,
+    CharucoTarget,
+    ChessboardTarget,
+    PointsTarget,
+    Target,
+)
 from hecbench_datasets.reading.sources import yaml_value
+
+_KINDS = (ChessboardTarget, CharucoTarget, AprilTagTarget, ArucoTarget, ArucoGridTarget, AprilGridTarget)
 
 
 class Camera(msgspec.Struct, forbid_unknown_fields=True):
@@ -22,11 +34,14 @@ class Camera(msgspec.Struct, forbid_unknown_fields=True):
     height: int
     K: list[list[float]] | None = None
     distortion: list[float] = []
+    distortion_model: str = OPENCV
 
     def model(self) -> CameraModel:
         """As the recordings have it."""
         K = None if self.K is None else np.array(self.K, float)
-        return CameraModel(self.width, self.height, K, np.array(self.distortion, float))
+        return CameraModel(
+            self.width, self.height, K, np.array(self.distortion, float), self.distortion_model
+        )
 
 
 class Hints(msgspec.Struct, forbid_unknown_fields=True):
@@ -75,14 +90,15 @@ def hinted_target(hints: Hints, file: Path) -> Target | None:
             return circle_grid(**values)
         if kind == "points":
             return PointsTarget.of(np.array(values["points_m"], float).reshape(-1, 3))
-        for known in (ChessboardTarget, CharucoTarget, AprilTagTarget):
+        for known in _KINDS:
             if kind == known.kind:
                 return known(**values)
     except (TypeError, KeyError, ValueError) as error:
         raise InputError(f"{file}: target: {error}") from error
     except InputError as error:
         raise InputError(f"{file}: {error}") from error
-    raise InputError(f"{file}: target.kind: '{kind}'; use chessboard, charuco, apriltag, circles or points")
+    kinds = ", ".join(known.kind for known in _KINDS)
+    raise InputError(f"{file}: target.kind: '{kind}'; use {kinds}, circles or points")
 
 
 def circle_grid(columns: int, rows: int, spacing_m: float) -> PointsTarget:

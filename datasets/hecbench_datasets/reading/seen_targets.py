@@ -21,6 +21,8 @@ _DICTIONARIES = (
     "DICT_ARUCO_ORIGINAL",
     *_FAMILIES,
 )
+_KALIBR_SUFFIX = " with a border of two cells"
+_KALIBR = f"DICT_APRILTAG_36h11{_KALIBR_SUFFIX}"
 _BOARD_FROM = 4
 """Markers in one picture that make a board rather than a few tags."""
 
@@ -61,8 +63,12 @@ def _markers(greys: Sequence[NDArray[np.uint8]]) -> str | None:
     import cv2
 
     best: tuple[int, str, int] = 0, "", 0
-    for name in _DICTIONARIES:
-        detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name)))
+    kalibr = cv2.aruco.DetectorParameters()
+    kalibr.markerBorderBits = 2
+    for name in (*_DICTIONARIES, _KALIBR):
+        parameters = kalibr if name == _KALIBR else cv2.aruco.DetectorParameters()
+        code = getattr(cv2.aruco, name.removesuffix(_KALIBR_SUFFIX))
+        detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(code), parameters)
         counts = [
             0 if (ids := detector.detectMarkers(grey)[1]) is None else len(np.unique(ids)) for grey in greys
         ]
@@ -70,12 +76,24 @@ def _markers(greys: Sequence[NDArray[np.uint8]]) -> str | None:
     total, name, most = best
     if total < len(greys) / 2:
         return None
-    if most < _BOARD_FROM and name in _FAMILIES:
+    if name == _KALIBR or (most >= _BOARD_FROM and name in _FAMILIES):
+        family = _FAMILIES[name.removesuffix(_KALIBR_SUFFIX)]
+        return (
+            f"they show up to {most} tags of {family}: write target: {{kind: aprilgrid, columns: C, rows: R, tag_m: S, "
+            f"spacing: G, family: {family}}} with the side S of a tag in m and the white between two over it"
+        )
+    if most < _BOARD_FROM and name not in _FAMILIES:
+        return (
+            f"they show markers of {name}: write target: {{kind: aruco, dictionary: {name}, id: N, size_m: S}} with "
+            "the side S of the black square in m"
+        )
+    if most < _BOARD_FROM:
         return (
             f"they show tags of {_FAMILIES[name]}: write target: {{kind: apriltag, family: {_FAMILIES[name]}, id: -1, "
             "size_m: S} with the side S of the black square in m"
         )
     return (
         f"they show up to {most} markers of {name}: write target: {{kind: charuco, columns: C, rows: R, square_m: S, "
-        f"marker_m: M, dictionary: {name}}} with the board's squares"
+        f"marker_m: M, dictionary: {name}}} with the board's squares, or, without black squares between the markers, "
+        f"{{kind: aruco_grid, columns: C, rows: R, marker_m: M, gap_m: G, dictionary: {name}}}"
     )

@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench.errors import InputError, TargetNotSeen
+from hecbench.errors import TargetNotSeen
 from hecbench.se3 import Array
 from hecbench.targets import CharucoTarget
+from hecbench_plugins.detection.dictionaries import named, shown_in
 from hecbench_plugins.detection.pictures import each, mirrored
 
 Grey = NDArray[np.uint8]
@@ -30,7 +31,7 @@ def find(greys: Sequence[Grey | None], target: CharucoTarget) -> tuple[CharucoTa
     layout, found, count = _best(greys, target, first=0)
     if count == 0:
         first = _first_id(greys, target)
-        if 0 < first <= len(_dictionary(target.dictionary).bytesList) - target.columns * target.rows // 2:
+        if 0 < first <= len(named(target.dictionary).bytesList) - target.columns * target.rows // 2:
             layout, found, count = _best(greys, target, first)
     if count == 0:
         raise TargetNotSeen(f"target: no image shows the ChArUco board; {_cause(greys, target)}")
@@ -57,7 +58,7 @@ def _first_id(greys: Sequence[Grey | None], target: CharucoTarget) -> int:
 def _marker_ids(grey: Grey, dictionary: str) -> list[int]:
     import cv2
 
-    _, ids, _ = cv2.aruco.ArucoDetector(_dictionary(dictionary)).detectMarkers(grey)
+    _, ids, _ = cv2.aruco.ArucoDetector(named(dictionary)).detectMarkers(grey)
     return [] if ids is None else [int(number) for number in np.ravel(ids)]
 
 
@@ -80,17 +81,7 @@ def _cause(greys: Sequence[Grey | None], target: CharucoTarget) -> str:
         )
     if note := mirrored(greys, _marker_ids, target.dictionary):
         return note.removeprefix("; ")
-    return _dictionary_in(greys, target)
-
-
-def _dictionary(name: str) -> Any:
-    import cv2
-
-    known = sorted({attribute for attribute in dir(cv2.aruco) if attribute.startswith("DICT_")})
-    wanted = name if name.startswith("DICT_") else f"DICT_{name}"
-    if wanted not in known:
-        raise InputError(f"target.dictionary: '{name}' is not one of {', '.join(known)}")
-    return cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, wanted))
+    return shown_in(greys, target.dictionary)
 
 
 def board_of(target: CharucoTarget, first: int = 0) -> Any:
@@ -98,7 +89,7 @@ def board_of(target: CharucoTarget, first: int = 0) -> Any:
     import cv2
 
     size = target.columns, target.rows
-    dictionary, ids = _dictionary(target.dictionary), None
+    dictionary, ids = named(target.dictionary), None
     if first:
         ids = first + np.arange(target.columns * target.rows // 2, dtype=np.int32)
     board = cv2.aruco.CharucoBoard(size, target.square_m, target.marker_m, dictionary, ids)
@@ -115,20 +106,3 @@ def _corners(grey: Grey, target: CharucoTarget, first: int) -> Array | None:
     corners = np.full((len(target.points_m), 2), np.nan)
     corners[np.ravel(ids)] = np.asarray(points, float).reshape(-1, 2)
     return corners
-
-
-def _dictionary_in(greys: Sequence[Grey | None], target: CharucoTarget) -> str:
-    """The cure: which dictionary's markers the first picture shows most of."""
-    import cv2
-
-    grey = next((grey for grey in greys if grey is not None), None)
-    names = [name for name in dir(cv2.aruco) if name.startswith("DICT_") and not name.endswith("000")]
-    counts = {
-        name: len(cv2.aruco.ArucoDetector(_dictionary(name)).detectMarkers(grey)[0])
-        for name in names
-        if grey is not None
-    }
-    best = max(counts, key=lambda name: counts[name], default=None)
-    if best is None or counts[best] == 0:
-        return "no marker of any dictionary is in the first image: check focus, light and size"
-    return f"the first image shows {counts[best]} markers of {best}, not {target.dictionary}"

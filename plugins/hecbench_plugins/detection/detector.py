@@ -10,8 +10,16 @@ import numpy as np
 from hecbench.errors import InputError, TargetNotSeen
 from hecbench.recording import CameraModel, Recording
 from hecbench.se3 import Array
-from hecbench.targets import AprilTagTarget, CharucoTarget, ChessboardTarget, PointsTarget, Target, grid_shape
-from hecbench_plugins.detection import apriltag, charuco, chessboard, circles
+from hecbench.targets import (
+    AprilTagTarget,
+    CharucoTarget,
+    ChessboardTarget,
+    MarkersTarget,
+    PointsTarget,
+    Target,
+    grid_shape,
+)
+from hecbench_plugins.detection import apriltag, charuco, chessboard, circles, markers
 from hecbench_plugins.detection.intrinsics import calibrate
 from hecbench_plugins.detection.orientation import choose_turns, turned_grids
 from hecbench_plugins.detection.pictures import Grey, Greys, each
@@ -52,6 +60,8 @@ def detect(recording: Recording, *, refit_intrinsics: bool = False) -> Recording
     notes = [f"{target.kind} found in {len(seen)} of {images} images"]
     if isinstance(target, CharucoTarget) and target != recording.target:
         notes.append(f"its layout is {'legacy' if target.legacy else 'new'}, not as declared (OpenCV 4.6)")
+    if isinstance(target, MarkersTarget) and target != recording.target:
+        notes.append(f"its first id is {target.first_id}")
     if isinstance(target, AprilTagTarget) and target != recording.target:
         notes.append(f"its id is {target.id}")
     camera = recording.camera
@@ -73,6 +83,8 @@ def _find(greys: Sequence[Grey | None], target: Target) -> tuple[Target, Found, 
             return *apriltag.find(greys, target), None
         case CharucoTarget():
             return *charuco.find(greys, target), None
+        case MarkersTarget():
+            return *markers.find(greys, target), None
         case ChessboardTarget():
             shape = target.columns, target.rows
             return target, each(greys, chessboard.corners, *shape), shape if _looks_alike(*shape) else None

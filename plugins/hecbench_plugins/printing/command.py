@@ -9,22 +9,31 @@ import click
 
 from hecbench.errors import InputError
 
+_KINDS = ("chessboard", "charuco", "apriltag", "circles", "aruco", "aruco_grid", "aprilgrid")
+
 
 @click.command()
-@click.argument("kind", type=click.Choice(["chessboard", "charuco", "apriltag", "circles"]))
+@click.argument("kind", type=click.Choice([*_KINDS]))
 @click.option(
     "--size", "size_mm", type=float, required=True, metavar="MM",
     help="Of a square, of the black border of a tag, or between the centres of dots.",
 )  # fmt: skip
 @click.option(
-    "--grid", metavar="COLUMNSxROWS", help="Inner corners (chessboard), squares (charuco) or dots (circles)."
+    "--grid", metavar="COLUMNSxROWS", help="Inner corners (chessboard), squares (charuco), dots or markers."
 )
 @click.option(
     "--marker", "marker_mm", type=float, metavar="MM", help="Of a ChArUco marker; default: 3/4 of --size."
 )
-@click.option("--dictionary", default="4X4_50", show_default=True, help="Of a ChArUco board.")
-@click.option("--family", default="tag36h11", show_default=True, help="Of a tag.")
-@click.option("--id", "tag_id", default=0, show_default=True, help="Of a tag.")
+@click.option(
+    "--gap",
+    "gap_mm",
+    type=float,
+    metavar="MM",
+    help="White between two markers of a grid; default: 3/10 of --size.",
+)
+@click.option("--dictionary", default="4X4_50", show_default=True, help="Of ArUco markers.")
+@click.option("--family", default="tag36h11", show_default=True, help="Of AprilTags.")
+@click.option("--id", "tag_id", default=0, show_default=True, help="Of a marker, or of the first of a grid.")
 @click.option("--paper", default="A4", show_default=True, help="A0 to A5, letter or legal.")
 @click.option(
     "--out", type=click.Path(path_type=Path, dir_okay=False), help="PDF, SVG or PNG; default: KIND.pdf"
@@ -34,6 +43,7 @@ def target(
     size_mm: float,
     grid: str | None,
     marker_mm: float | None,
+    gap_mm: float | None,
     dictionary: str,
     family: str,
     tag_id: int,
@@ -50,8 +60,11 @@ def target(
 
     if not 0 < size_mm < 2000:
         raise InputError(f"--size {size_mm}: give millimetres, more than 0 and less than 2000")
+    gap_m = (0.3 * size_mm if gap_mm is None else gap_mm) / 1e3
     if kind == "apriltag":
         made: targets.Target = targets.AprilTagTarget(family, tag_id, size_mm / 1e3)
+    elif kind == "aruco":
+        made = targets.ArucoTarget(dictionary, tag_id, size_mm / 1e3)
     else:
         columns, rows = _grid(kind, grid)
         if kind == "chessboard":
@@ -59,6 +72,12 @@ def target(
         elif kind == "charuco":
             marker_m = (0.75 * size_mm if marker_mm is None else marker_mm) / 1e3
             made = targets.CharucoTarget(columns, rows, size_mm / 1e3, marker_m, dictionary)
+        elif kind == "aruco_grid":
+            made = targets.ArucoGridTarget(columns, rows, size_mm / 1e3, gap_m, dictionary, tag_id)
+        elif kind == "aprilgrid":
+            made = targets.AprilGridTarget(
+                columns, rows, size_mm / 1e3, 1e3 * gap_m / size_mm, family, tag_id
+            )
         else:
             y, x = np.mgrid[:rows, :columns] * size_mm / 1e3
             made = targets.PointsTarget.of(np.stack([x, y, np.zeros_like(x)], -1).reshape(-1, 3))

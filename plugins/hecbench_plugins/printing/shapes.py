@@ -8,8 +8,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench.errors import InputError
-from hecbench.targets import AprilTagTarget, CharucoTarget, ChessboardTarget, PointsTarget, Target, grid_shape
+from hecbench.targets import (
+    AprilGridTarget,
+    AprilTagTarget,
+    ArucoGridTarget,
+    ArucoTarget,
+    CharucoTarget,
+    ChessboardTarget,
+    PointsTarget,
+    Target,
+    grid_shape,
+)
 from hecbench_plugins.detection.charuco import board_of
+from hecbench_plugins.detection.dictionaries import named
 
 _DOT, _FIRST_DOT = 0.5, 0.75
 """Diameter over spacing of the dots of a circle grid, and of the first one, which says where the grid begins."""
@@ -58,6 +69,17 @@ def pattern(target: Target) -> Pattern:
             return _charuco(target)
         case AprilTagTarget():
             return _tag(target)
+        case ArucoTarget():
+            return _markers(
+                target.dictionary, [target.id], (1, 1), 1e3 * target.size_m, 1e3 * target.size_m, 1
+            )
+        case ArucoGridTarget():
+            pitch = 1e3 * (target.marker_m + target.gap_m)
+            ids = list(range(target.first_id, target.first_id + target.marker_count))
+            size = target.columns, target.rows
+            return _markers(target.dictionary, ids, size, 1e3 * target.marker_m, pitch, 1)
+        case AprilGridTarget():
+            return _aprilgrid(target)
         case PointsTarget():
             return _dots(target)
     raise InputError(f"target.kind: '{target.kind}' cannot be printed")
@@ -113,6 +135,52 @@ def _tag(target: AprilTagTarget) -> Pattern:
     image = np.rot90(dictionary.generateImageMarker(target.id, bits), 2)  # OpenCV's tags stand upside down
     side = 1e3 * target.size_m
     return Pattern(tuple(_bits(image, (0.0, 0.0), side / bits)), side, side, side / bits)
+
+
+def _markers(
+    dictionary: str, ids: list[int], size: tuple[int, int], side: float, pitch: float, border: int
+) -> Pattern:
+    """Markers row by row from the top left; `border` is their black border in cells."""
+    known = named(dictionary)
+    count, cells = len(known.bytesList), known.markerSize + 2 * border
+    if ids[-1] >= count:
+        raise InputError(
+            f"target: id {ids[-1]} is not in {dictionary}; its ids are 0 to {count - 1}: choose a larger dictionary"
+        )
+    columns, rows = size
+    shapes: list[Rectangle] = []
+    for place, number in enumerate(ids):
+        row, column = divmod(place, columns)
+        corner = column * pitch, (rows - 1 - row) * pitch
+        shapes += _bits(known.generateImageMarker(number, cells, borderBits=border), corner, side / cells)
+    return Pattern(
+        tuple(shapes),
+        side + (columns - 1) * pitch,
+        side + (rows - 1) * pitch,
+        max(side / cells, pitch - side),
+    )
+
+
+def _aprilgrid(target: AprilGridTarget) -> Pattern:
+    """As Kalibr prints it: borders of two cells, rows from the bottom, and black squares where four tags meet."""
+    side = 1e3 * target.tag_m
+    gap, pitch = side * target.spacing, side * (1 + target.spacing)
+    ids = np.arange(target.first_id, target.first_id + target.marker_count).reshape(
+        target.rows, target.columns
+    )
+    size = target.columns, target.rows
+    turned = _markers(target.dictionary, ids[:, ::-1].ravel().tolist(), size, side, pitch, 2)
+    tags = tuple(  # OpenCV's tags stand upside down: the whole page is turned
+        Rectangle(gap + turned.width - r.x - r.width, gap + turned.height - r.y - r.height, r.width, r.height)
+        for r in turned.shapes
+        if isinstance(r, Rectangle)
+    )
+    squares = tuple(
+        Rectangle(i * pitch, j * pitch, gap, gap)
+        for j in range(target.rows + 1)
+        for i in range(target.columns + 1)
+    )
+    return Pattern((*tags, *squares), turned.width + 2 * gap, turned.height + 2 * gap, gap)
 
 
 def _dots(target: PointsTarget) -> Pattern:

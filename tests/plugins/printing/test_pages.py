@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from hecbench_plugins.detection import charuco, chessboard, circles
+from hecbench_plugins.detection import charuco, chessboard, circles, markers
 from hecbench_plugins.printing import page
 from hecbench_plugins.printing.command import target as verb
 from hecbench_plugins.printing.shapes import pattern
@@ -15,7 +15,16 @@ from PIL import Image
 
 from hecbench.errors import InputError
 from hecbench.system import apriltags
-from hecbench.targets import AprilTagTarget, CharucoTarget, ChessboardTarget, PointsTarget
+from hecbench.targets import (
+    AprilGridTarget,
+    AprilTagTarget,
+    ArucoGridTarget,
+    ArucoTarget,
+    CharucoTarget,
+    ChessboardTarget,
+    MarkersTarget,
+    PointsTarget,
+)
 
 DPI = 150
 
@@ -41,6 +50,8 @@ def found_px(target, grey):
             return chessboard.corners(grey, target.columns, target.rows)
         case CharucoTarget():
             return charuco.find([grey], target)[1][0]
+        case MarkersTarget():
+            return markers.find([grey], target)[1][0]
         case _:
             grid, marked = circles.centres(grey, 5, 6)
             assert marked
@@ -58,6 +69,9 @@ def found_px(target, grey):
         (AprilTagTarget("tag25h9", 3, 0.1), "A4"),
         (AprilTagTarget("tag16h5", 2, 0.1), "letter"),
         (dots(5, 6, 0.025), "A4"),
+        (ArucoTarget("4X4_50", 3, 0.1), "A4"),
+        (ArucoGridTarget(4, 5, 0.03, 0.009, "6X6_250"), "A4"),
+        (AprilGridTarget(6, 5, 0.024, 0.3), "A4"),
     ],
     ids=lambda value: value if isinstance(value, str) else value.kind,
 )
@@ -108,6 +122,9 @@ def test_no_cell_of_a_tag_is_drawn_twice():
         (["apriltag", "--size", "50", "--id", "100000"], "ids are 0 to"),
         (["charuco", "--size", "20", "--grid", "5x7", "--dictionary", "9X9"], "9X9"),
         (["apriltag", "--size", "50", "--paper", "A9"], "A9"),
+        (["aruco_grid", "--size", "20", "--grid", "9x6", "--dictionary", "4X4_50"], "larger dictionary"),
+        (["aruco", "--size", "20", "--id", "50"], "ids are 0 to 49"),
+        (["aprilgrid", "--size", "20", "--grid", "4x4", "--gap", "-1"], "spacing"),
         (["apriltag", "--size", "50", "--out", "tag.gif"], ".pdf, .svg or .png"),
     ],
 )

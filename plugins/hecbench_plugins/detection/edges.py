@@ -1,0 +1,70 @@
+"""Corners of a dark quadrilateral on white as the crossings of its edges.
+
+Along each edge the picture is read across it; the steepest rise, averaged over its width, says where the edge is,
+whatever the blur, as long as it is symmetric. Lines are fitted to these points by total least squares. The ends of an
+edge are left out: there blur rounds the corner, and other squares may touch it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hecbench.se3 import Array
+
+_ENDS = 0.15
+"""Share of an edge left out at either end."""
+_STEP_PX = 0.25
+_REACH_PX = (1.5, 4.0)
+"""Half the width that is read, at least and at most; between them, 0.7 of a cell: the next edge is a cell away."""
+_REACH_CELLS = 0.7
+_ROUNDS = 4
+_FARTHEST_PX = 4.0
+"""By which a corner may move in all."""
+_LEAST_CONTRAST = 8.0
+"""Grey levels between the two sides."""
+
+
+def refined(grey: NDArray[np.uint8], corners_px: Array, cells: int) -> Array | None:
+    """Corners (4, 2) px, clockwise in the picture, of a black square of `cells` cells a side; None without edges."""
+    found = corners_px
+    sides = np.linalg.norm(np.roll(corners_px, -1, 0) - corners_px, axis=1)
+    reach = float(np.clip(_REACH_CELLS * sides.min() / cells, *_REACH_PX))
+    for _ in range(_ROUNDS):
+        edges = (_line(grey, found[i], found[(i + 1) % 4], reach) for i in range(4))
+        lines = [line for line in edges if line is not None]
+        if len(lines) < 4:
+            return None
+        crossings = np.array([np.cross(lines[i - 1], lines[i]) for i in range(4)])
+        found = crossings[:, :2] / crossings[:, 2:]
+        if not np.isfinite(found).all() or np.linalg.norm(found - corners_px, axis=1).max() > _FARTHEST_PX:
+            return None
+    return found
+
+
+def _line(grey: NDArray[np.uint8], start: Array, end: Array, reach: float) -> Array | None:
+    """The line (3,), a x + b y + c = 0, of the edge between two corners; None without a step from black to white."""
+    import cv2
+
+    along = end - start
+    length = float(np.linalg.norm(along))
+    direction = along / length
+    outward = np.array([direction[1], -direction[0]])
+    places = np.linspace(_ENDS, 1 - _ENDS, max(6, int(length)))
+    offsets = np.arange(-reach, reach + _STEP_PX / 2, _STEP_PX)
+    points = start + places[:, None, None] * along + offsets[:, None] * outward
+    x, y = np.moveaxis(points, -1, 0).astype(np.float32)
+    values = np.asarray(cv2.remap(grey, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), float)
+    rise = np.maximum(np.diff(values, axis=1), 0.0)
+    weights = rise.sum(1)
+    if np.median(weights) < _LEAST_CONTRAST:
+        return None
+    middles = (offsets[:-1] + offsets[1:]) / 2
+    clear = weights > _LEAST_CONTRAST / 2
+    edge = (rise @ middles)[clear] / weights[clear]
+    on_edge = start + places[clear, None] * along + edge[:, None] * outward
+    share = weights[clear] / weights[clear].sum()
+    centre = share @ on_edge
+    spread = (on_edge - centre).T * share @ (on_edge - centre)
+    normal = np.linalg.eigh(spread)[1][:, 0]
+    return np.array([*normal, -normal @ centre])
