@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
 from contextlib import ExitStack
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
+from hecbench.commands.devices import device_settings, open_device
 from hecbench.errors import InputError
 
 if TYPE_CHECKING:
     from hecbench.recording import Recording
-    from hecbench.specs import Kind
     from hecbench_hardware.devices import Robot
 
 _folder = click.Path(path_type=Path, file_okay=False)
@@ -129,30 +128,6 @@ def record(
         if isinstance(eye, KnowsTruth):
             recording = eye.with_truth(recording)
     _print(recording, out, as_json)
-
-
-def device_settings(pairs: tuple[str, ...]) -> dict[str, dict[str, str]]:
-    """Options by device from ``robot.x=1``, ``camera.y=2``, ``gripper.z=3``."""
-    found: dict[str, dict[str, str]] = {"robot": {}, "camera": {}, "gripper": {}}
-    for pair in pairs:
-        key, separator, value = pair.partition("=")
-        device, dot, name = key.partition(".")
-        if not separator or not dot or device not in found:
-            raise InputError(f"--set {pair}: write robot.NAME=VALUE, camera.NAME=VALUE or gripper.NAME=VALUE")
-        found[device][name] = value
-    return found
-
-
-def open_device(kind: Kind, name: str, options: Mapping[str, str]) -> Any:
-    """Open a device by name; an option that it does not take is refused."""
-    from hecbench import registry
-    from hecbench.specs import DeviceSpec
-
-    spec = registry.load().get(kind, name, DeviceSpec)
-    for option in options:
-        if option not in spec.options:
-            raise InputError(f"{kind} '{name}' has no option {option}: it takes {', '.join(spec.options)}")
-    return spec.open(options)
 
 
 def _checked(

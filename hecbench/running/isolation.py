@@ -137,11 +137,18 @@ def serve(parent: int, memory_mb: int | None) -> None:
         except EOFError:
             return
         try:
-            content = pickle.dumps(function(*arguments))
+            answer = function(*arguments)
         except Exception as error:  # whatever it is, the caller decides
-            content = pickle.dumps(_portable(error))
-        answers.write(content)
+            answer = _portable(error)
+        answers.write(_packed(answer))
         answers.flush()
+
+
+def _packed(answer: Any) -> bytes:
+    try:
+        return pickle.dumps(answer)
+    except Exception as error:  # pickle has no base class of its own for what it cannot carry
+        return pickle.dumps(Ended(f"its answer cannot be pickled: {error}"))
 
 
 def _portable(error: Exception) -> Exception:

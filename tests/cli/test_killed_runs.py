@@ -12,7 +12,7 @@ import pytest
 
 COMMAND = [sys.executable, "-m", "hecbench", "run", "markers", "--level", "tag_2m", "--seed", "3"]
 SOLVERS = ["--solver", "bundle", "--solver", "park"]
-ITEMS = 24
+ITEMS = 60
 DEADLINE_S = 120
 """Generous: the machine may be busy."""
 

@@ -1,5 +1,9 @@
 """``hecbench train`` refuses in one line."""
 
+import pytest
+
+pytest.importorskip("torch", reason="training needs the extra torch")
+
 
 def test_bad_options(hecbench, refused, tmp_path):
     refused(

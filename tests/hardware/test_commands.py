@@ -20,6 +20,8 @@ from hecbench.recording import CameraModel, Mounting, Recording, RobotDescriptio
 from hecbench.storage import recording_io
 from hecbench.targets import ChessboardTarget
 
+pytest.importorskip("rtde_receive", reason="ur-rtde has no wheel for this Python")
+
 FAST = ("--set", "robot.time_scale=50", "--set", "robot.max_age_s=5", "--set", "robot.leniency=10")
 
 

@@ -4,12 +4,8 @@ import socket
 import struct
 import time
 
-import dashboard_client
 import numpy as np
 import pytest
-import rtde_control
-import rtde_io
-import rtde_receive
 from hecbench_hardware.controller_sim.arm import SimulatedArm
 from hecbench_hardware.controller_sim.control_script import DONE
 from hecbench_hardware.controller_sim.process import SimulatedController
@@ -19,6 +15,11 @@ from hecbench_hardware.controller_sim.urscript.uploads import start_program
 from hecbench_hardware.kinematics import ARMS
 
 from hecbench.errors import InputError
+
+dashboard_client = pytest.importorskip("dashboard_client", reason="ur-rtde has no wheel for this Python")
+rtde_control = pytest.importorskip("rtde_control", reason="ur-rtde has no wheel for this Python")
+rtde_io = pytest.importorskip("rtde_io", reason="ur-rtde has no wheel for this Python")
+rtde_receive = pytest.importorskip("rtde_receive", reason="ur-rtde has no wheel for this Python")
 
 HOME = [0.0, -1.5708, 1.5708, -1.5708, -1.5708, 0.0]
 READY = [0.3, -1.4, 1.5, -1.6, -1.5, 0.2]

@@ -16,6 +16,8 @@ from hecbench_hardware.ur.dashboard import Dashboard
 from hecbench_hardware.ur.stream import Supervision
 from hecbench_hardware.ur.worker import WATCHDOG_HZ
 
+pytest.importorskip("rtde_receive", reason="ur-rtde has no wheel for this Python")
+
 AGE_S = 0.9
 BOUND_S = Supervision(max_age_s=AGE_S).patience_s + 1 / WATCHDOG_HZ
 """Without braking. The motions here last many times longer."""

@@ -25,6 +25,8 @@ from hecbench.recording import CameraModel, Mounting, Recording, RobotDescriptio
 from hecbench.storage import recording_io
 from hecbench.targets import AprilTagTarget
 
+pytest.importorskip("rtde_receive", reason="ur-rtde has no wheel for this Python")
+
 ARM = ARMS["ur5e"]
 K = np.array([[600.0, 0, 320], [0, 600, 240], [0, 0, 1]])
 

@@ -20,6 +20,8 @@ from hecbench.estimate import Estimate
 from hecbench.recording import Mounting, Recording, RobotDescription
 from hecbench.storage import recording_io
 
+pytest.importorskip("rtde_receive", reason="ur-rtde has no wheel for this Python")
+
 MADE_READY = ("motion", "unlock", "power on", "brake release")
 
 

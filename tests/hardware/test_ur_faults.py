@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 from hecbench_hardware.devices import DeviceFault, Fault
 
+pytest.importorskip("rtde_receive", reason="ur-rtde has no wheel for this Python")
+
 SLOW_RAD_S = 0.002
 """Twenty seconds for two radians at the controller's pace, unless a fault ends it; more than what counts as still."""
 

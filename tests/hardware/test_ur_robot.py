@@ -26,6 +26,8 @@ from hecbench.errors import InputError
 from hecbench.registry import load
 from hecbench.specs import DeviceSpec, Kind
 
+pytest.importorskip("rtde_receive", reason="ur-rtde has no wheel for this Python")
+
 SLOW_RAD_S = 0.02
 
 

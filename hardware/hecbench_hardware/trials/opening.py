@@ -6,10 +6,10 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 
 from hecbench import registry
+from hecbench.commands.devices import device_settings, open_device
 from hecbench.errors import InputError
 from hecbench.specs import DeviceSpec, Kind
 from hecbench_hardware.arming import Operator, take_control
-from hecbench_hardware.commands import device_settings, open_device
 from hecbench_hardware.devices import Robot
 from hecbench_hardware.lab import cells
 from hecbench_hardware.lab.arm import LabRobot

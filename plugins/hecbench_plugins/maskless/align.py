@@ -26,6 +26,8 @@ from hecbench_plugins.views import scene_background
 from hecbench_plugins.views.canvas import Canvas, Images
 from hecbench_plugins.views.spool import Spool
 
+Pictures = Sequence[NDArray[np.uint8]] | Spool
+
 HALF_LINE = 8
 """Samples on each side of the contour."""
 CORRELATED_POINTS = 30.0
@@ -36,6 +38,7 @@ _MOST_FOR_BACKGROUND = 40
 _COARSEST_PX = 400
 _BAND_PX = 20
 _LEAST_SIGMA_PX = 0.7
+_SMOOTH_PX = 0.8
 _CLIP_SHARE = 0.9
 _MOST_MOVE_RAD, _MOST_MOVE_M = 0.1, 0.05
 _SETTLED = 0.1
@@ -156,9 +159,11 @@ class ContourMatcher:
             return np.asarray(cv2.resize(picture, (width, height), interpolation=cv2.INTER_AREA))
 
         full, count = self.canvas.images, len(self.canvas)
-        self._images = full if self.level == 1 else Spool.of(lambda view: small(full[view]), count)
-        self._smooth = Spool.of(
-            lambda view: np.asarray(cv2.GaussianBlur(self._images[view], (0, 0), 0.8), np.uint8), count
+        self._images: Sequence[NDArray[np.uint8]] | Spool = (
+            full if self.level == 1 else Spool.of(lambda view: small(full[view]), count)
+        )
+        self._smooth: Pictures = Spool.of(
+            lambda view: np.asarray(cv2.GaussianBlur(self._images[view], (0, 0), _SMOOTH_PX), np.uint8), count
         )
         whole = np.asarray(small(255 * self.canvas.valid.astype(np.uint8))) > 254
         self._valid = np.asarray(cv2.erode(whole.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0)
@@ -207,6 +212,25 @@ class ContourMatcher:
         return ContourEquations(
             A.sum(0), b.sum(0), A, b, float(squares.sum()), int(used.sum()), sharp, judged, rms
         )
+
+    def show(self, image: NDArray[np.uint8], parent_T_link: Array) -> None:
+        """Look at another picture (H, W, 3) of the canvas' size from now on, its links at (L, 4, 4).
+
+        For streams, one view at full size; the colours that are known stay.
+        """
+        import cv2
+
+        self._images = [image]
+        self._smooth = [np.asarray(cv2.GaussianBlur(image, (0, 0), _SMOOTH_PX), np.uint8)]
+        self.parent_T_link = parent_T_link[None]
+
+    def colours(self) -> tuple[NDArray[np.float32], ...]:
+        """What is known of the colours, for `recall`."""
+        return self._log_inside.copy(), self._log_around.copy(), self._mean_around
+
+    def recall(self, colours: tuple[NDArray[np.float32], ...]) -> None:
+        """Forget what was learned since `colours` were asked for."""
+        self._log_inside, self._log_around, self._mean_around = colours
 
     def learn(self, camera_T_parent: Array, spacing: float) -> None:
         """Find the colours of the parts and of what is around them at a pose (4, 4)."""

@@ -67,6 +67,67 @@ class Canvas:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class Rectification:
+    """How a camera's pictures become those of a pinhole camera on the canvas.
+
+    Attributes:
+        maps: where each pixel of the unshrunk canvas lies in the picture, x and y.
+        K: (3, 3) px of the canvas.
+        valid: (H, W) where the canvas lies inside the picture.
+        shrink: unshrunk pixels for one of the canvas.
+    """
+
+    maps: tuple[NDArray[np.float32], NDArray[np.float32]]
+    K: Array
+    valid: NDArray[np.bool_]
+    shrink: int
+
+    @staticmethod
+    def of(camera: CameraModel) -> Rectification:
+        """Of a camera whose K is known.
+
+        Raises:
+            InputError: K has skew.
+        """
+        import cv2
+
+        pad = 0 if camera.is_pinhole else PAD_PX
+        width, height = (-(-(size + 2 * pad) // _GRID) * _GRID for size in (camera.width, camera.height))
+        K = camera.intrinsics.copy()
+        K[:2, 2] += pad
+        if K[0, 1] != 0:
+            raise InputError("camera.K: has skew, which the undistortion of photographs does not support")
+        fisheye = camera.distortion_model == EQUIDISTANT
+        rectify: Any = cv2.fisheye.initUndistortRectifyMap if fisheye else cv2.initUndistortRectifyMap
+        coefficients = camera.distortion if len(camera.distortion) else np.zeros(4)
+        across, down = rectify(camera.intrinsics, coefficients, np.eye(3), K, (width, height), cv2.CV_32FC1)
+        valid = (across >= 0) & (down >= 0) & (across <= camera.width - 1) & (down <= camera.height - 1)
+        shrink = int(np.ceil(width / _LARGEST_PX))
+        if shrink > 1:
+            height, width = _shrunk_size(valid.shape, shrink)
+            cut = valid[: height * shrink, : width * shrink]
+            valid = np.asarray(cut.reshape(height, shrink, width, shrink).all((1, 3)))
+            K = shrunk_intrinsics(K, 1 / shrink)
+        return Rectification((across, down), K, valid, shrink)
+
+    def image(self, image: Images) -> Images:
+        """A picture (H, W, 3) RGB on the canvas."""
+        import cv2
+
+        flat = np.asarray(cv2.remap(image, *self.maps, cv2.INTER_LINEAR), np.uint8)
+        if self.shrink == 1:
+            return flat
+        height, width = _shrunk_size(flat.shape, self.shrink)
+        cut = flat[: height * self.shrink, : width * self.shrink]
+        return np.asarray(cv2.resize(cut, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
+
+
+def _shrunk_size(shape: Sequence[int], by: int) -> tuple[int, int]:
+    """(H, W), whole multiples of the grid."""
+    return shape[0] // by // _GRID * _GRID, shape[1] // by // _GRID * _GRID
+
+
 def undistorted_canvas(recording: Recording, robot: PosedRobot) -> Canvas:
     """Read and undistort the photographs of all samples with joints.
 
@@ -79,50 +140,9 @@ def undistorted_canvas(recording: Recording, robot: PosedRobot) -> Canvas:
     rows = [i for i in robot.samples.tolist() if i < len(sources) and sources[i] is not None]
     if not rows:
         raise Refusal("no sample with joints has an image")
-    maps, K, valid = _lens(camera)
-    shrink = int(np.ceil(valid.shape[1] / _LARGEST_PX))
-
-    def one(number: int) -> Images:
-        import cv2
-
-        image = np.asarray(cv2.remap(recording.image(rows[number]), *maps, cv2.INTER_LINEAR), np.uint8)
-        return image if shrink == 1 else _shrunk(image, shrink)
-
-    images = Spool.of(one, len(rows))
-    if shrink > 1:
-        height, width = images.shape[1:3]
-        cut = valid[: height * shrink, : width * shrink]
-        valid = np.asarray(cut.reshape(height, shrink, width, shrink).all((1, 3)))
-        K = shrunk_intrinsics(K, 1 / shrink)
+    lens = Rectification.of(camera)
+    images = Spool.of(lambda number: lens.image(recording.image(rows[number])), len(rows))
     at_flange = robot.flange_link == robot.parent_link
     flange = None if at_flange else robot.model.link_index(robot.flange_link)
     samples = tuple(recording.sample_ids[row] for row in rows)
-    return Canvas(K, images, valid, joints[rows], robot.link_poses(joints[rows]), flange, samples)
-
-
-def _lens(
-    camera: CameraModel,
-) -> tuple[tuple[NDArray[np.float32], NDArray[np.float32]], Array, NDArray[np.bool_]]:
-    """Where each pixel of the canvas lies in the image, the canvas' K, and where that is inside the image."""
-    import cv2
-
-    pad = 0 if camera.is_pinhole else PAD_PX
-    width, height = (-(-(size + 2 * pad) // _GRID) * _GRID for size in (camera.width, camera.height))
-    K = camera.intrinsics.copy()
-    K[:2, 2] += pad
-    if camera.intrinsics[0, 1] != 0:
-        raise InputError("camera.K: has skew, which the undistortion of photographs does not support")
-    fisheye = camera.distortion_model == EQUIDISTANT
-    rectify: Any = cv2.fisheye.initUndistortRectifyMap if fisheye else cv2.initUndistortRectifyMap
-    coefficients = camera.distortion if len(camera.distortion) else np.zeros(4)
-    across, down = rectify(camera.intrinsics, coefficients, np.eye(3), K, (width, height), cv2.CV_32FC1)
-    valid = (across >= 0) & (down >= 0) & (across <= camera.width - 1) & (down <= camera.height - 1)
-    return (across, down), K, valid
-
-
-def _shrunk(image: Images, by: int) -> Images:
-    import cv2
-
-    height, width = (size // by // _GRID * _GRID for size in image.shape[:2])
-    cut = image[: height * by, : width * by]
-    return np.asarray(cv2.resize(cut, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
+    return Canvas(lens.K, images, lens.valid, joints[rows], robot.link_poses(joints[rows]), flange, samples)

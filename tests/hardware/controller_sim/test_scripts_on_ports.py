@@ -6,11 +6,12 @@ import time
 
 import numpy as np
 import pytest
-import rtde_control
-import rtde_io
-import rtde_receive
 from hecbench_hardware.controller_sim.dynamics import Dynamics
 from hecbench_hardware.kinematics import ARMS
+
+rtde_control = pytest.importorskip("rtde_control", reason="ur-rtde has no wheel for this Python")
+rtde_io = pytest.importorskip("rtde_io", reason="ur-rtde has no wheel for this Python")
+rtde_receive = pytest.importorskip("rtde_receive", reason="ur-rtde has no wheel for this Python")
 
 Q = "[0, -1.57, 1.57, -1.57, -1.57, 0.4]"
 PROGRAMS = [
