@@ -22,8 +22,8 @@ from hecbench.system import pictures
 from hecbench.targets import Target
 
 Image = NDArray[np.uint8]
-_Value = TypeVar("_Value", np.uint8, np.bool_)
-ImageSource = Path | Image | None
+_Value = TypeVar("_Value", np.uint8, np.bool_, np.float32)
+ImageSource = Path | Image | NDArray[np.uint16] | None
 """A file that is decoded when asked for, an array in memory, or nothing for this sample."""
 
 _ROTATION_TOLERANCE = 1e-3
@@ -37,6 +37,7 @@ class Need(StrEnum):
     INTRINSICS = "intrinsics"
     IMAGES = "images"
     MASKS = "masks"
+    DEPTH = "depth"
     JOINTS = "joints"
     ROBOT_MODEL = "robot_model"
     INITIAL = "initial"
@@ -85,6 +86,7 @@ class Recording:
         robot_stamp_s, camera_stamp_s: (N,).
         images: N sources of (height, width, 3) RGB.
         masks: N sources of (height, width), above 127 = robot, or 0 and 1.
+        depths: N sources of (height, width) 16-bit depth along the optical axis, mm, 0 where unknown.
         folder: where it was read from, None when generated.
         notes: what its importer found out about its conventions, to be said to the user; not saved.
     """
@@ -105,6 +107,7 @@ class Recording:
     camera_stamp_s: Array | None = None
     images: tuple[ImageSource, ...] | None = None
     masks: tuple[ImageSource, ...] | None = None
+    depths: tuple[ImageSource, ...] | None = None
     folder: Path | None = None
     notes: tuple[str, ...] = ()
 
@@ -130,7 +133,7 @@ class Recording:
         for name in ("robot_stamp_s", "camera_stamp_s"):
             self._put(name, self._per_sample(name, ()))
         self._check_corners()
-        for name in ("images", "masks"):
+        for name in _PER_SAMPLE_PICTURES:
             if (sources := getattr(self, name)) is not None and len(sources) != len(self):
                 raise InputError(f"{name}: {len(sources)} for {len(self)} samples")
         self._check_every_sample_has_a_robot_pose()
@@ -217,6 +220,7 @@ class Recording:
             Need.TARGET_POSES: self.camera_T_target is not None or (has_corners and has_intrinsics),
             Need.IMAGES: self.images is not None and any(image is not None for image in self.images),
             Need.MASKS: self.masks is not None and any(mask is not None for mask in self.masks),
+            Need.DEPTH: self.depths is not None and any(depth is not None for depth in self.depths),
             Need.JOINTS: self.joints_rad is not None,
             Need.ROBOT_MODEL: self.robot is not None and self.robot.source is not None,
             Need.INITIAL: self.initial_parent_T_camera is not None,
@@ -230,7 +234,7 @@ class Recording:
         for name in _PER_SAMPLE_ARRAYS:
             if (array := getattr(self, name)) is not None:
                 changes[name] = array[order]
-        for name in ("images", "masks"):
+        for name in _PER_SAMPLE_PICTURES:
             if (sources := getattr(self, name)) is not None:
                 changes[name] = tuple(sources[i] for i in order.tolist())
         return replace(self, **changes)
@@ -255,8 +259,16 @@ class Recording:
         """
         return self._picture("masks", index, pictures.mask)
 
+    def depth(self, index: int) -> NDArray[np.float32]:
+        """Decode one depth picture, (height, width) m along the optical axis, 0 where unknown; see `pictures.depth`.
+
+        Raises:
+            InputError: it is absent, unreadable, not 16-bit, or not of the camera's size.
+        """
+        return self._picture("depths", index, pictures.depth)
+
     def _picture(
-        self, name: str, index: int, decode: Callable[[Path | Image, str], NDArray[_Value]]
+        self, name: str, index: int, decode: Callable[[Path | NDArray[Any], str], NDArray[_Value]]
     ) -> NDArray[_Value]:
         sources = getattr(self, name)
         source = sources[index] if sources else None
@@ -298,6 +310,7 @@ class Present:
     corners_px: Array
     images: tuple[ImageSource, ...]
     masks: tuple[ImageSource, ...]
+    depths: tuple[ImageSource, ...]
     folder: Path
 
     def __init__(self, recording: Recording) -> None:
@@ -311,6 +324,7 @@ class Present:
         return value
 
 
+_PER_SAMPLE_PICTURES = ("images", "masks", "depths")
 _PER_SAMPLE_ARRAYS = (
     "base_T_flange",
     "joints_rad",

@@ -61,7 +61,9 @@ def refuses_an_empty_scene(solver: Solver) -> Iterator[str]:
     recording = photographs()
     wall = np.full_like(np.asarray(recording.image(0)), 128)
     nothing = np.zeros(wall.shape[:2], np.uint8)
-    empty = replace(recording, images=(wall,) * len(recording), masks=(nothing,) * len(recording))
+    far = np.full(wall.shape[:2], 3000, np.uint16)
+    views = len(recording)
+    empty = replace(recording, images=(wall,) * views, masks=(nothing,) * views, depths=(far,) * views)
     if not isinstance(answer(solver, empty), str):
         yield "pictures without a robot are answered instead of refused"
 

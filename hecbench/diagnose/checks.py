@@ -14,6 +14,7 @@ from hecbench.diagnose import (
     conditioning,
     consistency,
     coverage,
+    depth,
     image_quality,
     influence,
     intrinsics,
@@ -38,6 +39,7 @@ from hecbench.recording import Recording
 
 _STEPS: tuple[Callable[[Examination], tuple[Finding | None, Examination]], ...] = (
     image_quality.examine,
+    depth.examine,
     repeats.examine,
     camera_frame.examine,
     picture_residual.examine,

@@ -30,6 +30,7 @@ _HOW_TO_GIVE = {
     Need.INTRINSICS: "camera.K",
     Need.IMAGES: "samples[].image",
     Need.MASKS: "samples[].mask",
+    Need.DEPTH: "samples[].depth",
     Need.JOINTS: "samples[].joints_rad",
     Need.ROBOT_MODEL: "robot.model or robot.urdf",
     Need.INITIAL: "initial_parent_T_camera",

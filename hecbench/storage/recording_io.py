@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import zipfile
+from collections.abc import Callable
 from itertools import count
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -119,6 +120,7 @@ class _Sample(_Strict):
     corners_px: list[list[float] | None] | None = None
     image: str | None = None
     mask: str | None = None
+    depth: str | None = None
 
 
 class _Recording(_Strict):
@@ -189,6 +191,7 @@ def _build(parsed: _Recording, folder: Path) -> Recording:
         truth_parent_T_camera=_optional_array("truth_parent_T_camera", parsed.truth_parent_T_camera),
         images=_sources(folder, "image", [sample.image for sample in parsed.samples]),
         masks=_sources(folder, "mask", [sample.mask for sample in parsed.samples]),
+        depths=_sources(folder, "depth", [sample.depth for sample in parsed.samples]),
         folder=folder,
         **arrays,
     )
@@ -319,10 +322,11 @@ def save(recording: Recording, folder: str | Path) -> None:
     folder = Path(folder)
     images = _store_pictures(recording.images, folder, "images", recording.sample_ids)
     masks = _store_pictures(recording.masks, folder, "masks", recording.sample_ids)
+    depths = _store_pictures(recording.depths, folder, "depths", recording.sample_ids)
     samples = [
         {"id": recording.sample_ids[i]}
         | {name: _sample_value(getattr(recording, name), i) for name in _ARRAYS}
-        | {"image": images[i], "mask": masks[i]}
+        | {"image": images[i], "mask": masks[i], "depth": depths[i]}
         for i in range(len(recording))
     ]
     robot = recording.robot and {
@@ -391,8 +395,7 @@ def _store_pictures(
         elif isinstance(source, np.ndarray):
             name = _free_name(kind, f"{files.safe_name(sample_id)}.png", taken)
             where = f"samples[{len(names)}].{kind.removesuffix('s')}"
-            picture = pictures.image(source, where) if kind == "images" else _mask_picture(source, where)
-            files.write_bytes(folder / name, encode_png(picture))
+            files.write_bytes(folder / name, encode_png(_STORED[kind](source, where)))
             names.append(name)
         else:
             if source not in stored:
@@ -406,6 +409,17 @@ def _mask_picture(mask: NDArray[Any], where: str) -> NDArray[np.uint8]:
     return pictures.mask(mask, where).astype(np.uint8) * np.uint8(255)
 
 
+def _depth_picture(depth: NDArray[Any], where: str) -> NDArray[np.uint16]:
+    return np.asarray(np.rint(1e3 * pictures.depth(depth, where)), np.uint16)
+
+
+_STORED: dict[str, Callable[[NDArray[Any], str], NDArray[Any]]] = {
+    "images": pictures.image,
+    "masks": _mask_picture,
+    "depths": _depth_picture,
+}
+
+
 def _free_name(kind: str, name: str, taken: set[str]) -> str:
     """A name below `kind` that no other picture has, on file systems that ignore case too."""
     stem, suffix = Path(name).stem, Path(name).suffix
@@ -415,8 +429,8 @@ def _free_name(kind: str, name: str, taken: set[str]) -> str:
     return free
 
 
-def encode_png(picture: NDArray[np.uint8]) -> bytes:
-    """PNG bytes of (H, W, 3) RGB or (H, W) grey."""
+def encode_png(picture: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
+    """PNG bytes of (H, W, 3) RGB, or (H, W) grey of 8 or 16 bits."""
     from PIL import Image
 
     stream = io.BytesIO()

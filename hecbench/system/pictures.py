@@ -89,6 +89,29 @@ def mask(source: Path | bytes | NDArray[Any], where: str) -> NDArray[np.bool_]:
     raise InputError(f"{where}: the mask holds 0, {shown}: a label image? write 255 = robot, 0 = all else")
 
 
+def depth(source: Path | bytes | NDArray[Any], where: str) -> NDArray[np.float32]:
+    """A depth picture as (height, width) m, 0 where unknown, from 16 bits of millimetres.
+
+    Raises:
+        InputError: it is unreadable, has colours or 8 bits, or holds floats.
+    """
+    array = source if isinstance(source, np.ndarray) else _decoded(source, where)
+    if array.ndim != 2:
+        raise InputError(
+            f"{where}: has {array.shape[-1]} channels; give depth as a 16-bit grey PNG in millimetres"
+        )
+    if array.dtype == np.uint8:
+        raise InputError(
+            f"{where}: has 8 bits, a picture of depth rather than depth; give a 16-bit grey PNG in millimetres"
+        )
+    if array.dtype.kind not in "iu" or (array.size and (array.min() < 0 or array.max() > 65535)):
+        raise InputError(
+            f"{where}: holds {array.dtype} from {array.min():g} to {array.max():g}; multiply metres by 1000 and save a"
+            " 16-bit PNG"
+        )
+    return np.asarray(array, np.float32) * np.float32(1e-3)
+
+
 @contextmanager
 def _opened(content: bytes, where: str) -> Iterator[Any]:
     """Pillow's picture of the bytes, whose errors inside the block become an `InputError`."""

@@ -71,6 +71,7 @@ def load_beside_pictures(
         target=target,
         joints_rad=np.zeros((len(beside.images), 1)),
         images=tuple(beside.images),
+        depths=_depths(found, beside.images, notes),
         folder=found.path if found.path.is_dir() else found.path.parent,
         notes=tuple(notes),
     )
@@ -159,6 +160,28 @@ def _by_name(stream: Columns, pictures: list[Path]) -> tuple[list[int], list[Pat
             f"{stream.source}: {min(twice).name} stands in several rows, one picture for two poses; keep one"
         )
     return rows, images
+
+
+_WORDS = re.compile(r"depth|colou?r|rgb|image|aligned|raw", re.IGNORECASE)
+"""What the names of a picture and of its depth do not share."""
+
+
+def _depths(found: Survey, images: Sequence[Path], notes: list[str]) -> tuple[Path | None, ...] | None:
+    """The depth of each picture, by what their names share, or in their order where there are as many."""
+    if not found.depths:
+        return None
+    by_name = {_WORDS.sub("", file.stem).strip("_-. "): file for file in found.depths}
+    paired = [by_name.get(_WORDS.sub("", image.stem).strip("_-. ")) for image in images]
+    if len(by_name) < len(found.depths) or not any(paired):
+        if len(found.depths) != len(images):
+            notes.append(
+                f"{found.path}: {len(found.depths)} depth pictures for {len(images)} pictures and no common names: left"
+                " out; name each as its picture"
+            )
+            return None
+        paired = list(found.depths)
+    notes.append(f"{found.path}: depth of {sum(one is not None for one in paired)} pictures")
+    return tuple(paired)
 
 
 def _relative(folder: Path, path: Path) -> str:

@@ -19,6 +19,7 @@ _NO_TABLE = re.compile(
     r"readme|license|requirements|intrinsic|camera_?info|calib|^k$|distort|dist_?coeff|config", re.IGNORECASE
 )
 _NO_PICTURE = re.compile(r"mask|depth|segm|label", re.IGNORECASE)
+_DEPTH = re.compile(r"depth", re.IGNORECASE)
 _DEEPEST = 4
 _MOST_FILES = 20_000
 _MOST_TABLES = 50
@@ -36,6 +37,7 @@ class Survey:
         files: all of them.
         streams: what was recognised in its tables.
         pictures: by folder, in natural order.
+        depths: pictures of depth, in natural order.
         faults: why files that look like tables are none.
     """
 
@@ -43,6 +45,7 @@ class Survey:
     files: list[Path] = field(default_factory=list)
     streams: list[Columns] = field(default_factory=list)
     pictures: dict[Path, list[Path]] = field(default_factory=dict)
+    depths: list[Path] = field(default_factory=list)
     faults: list[str] = field(default_factory=list)
 
     @property
@@ -61,7 +64,10 @@ def survey(path: Path) -> Survey:
     for file in files:
         if file.suffix.lower() in IMAGE_SUFFIXES and not _NO_PICTURE.search(str(file.relative_to(path))):
             pictures[file.parent].append(file)
-    found = Survey(path, files, pictures=dict(pictures))
+    depths = [
+        f for f in files if f.suffix.lower() in IMAGE_SUFFIXES and _DEPTH.search(str(f.relative_to(path)))
+    ]
+    found = Survey(path, files, pictures=dict(pictures), depths=depths)
     tables = [f for f in files if f.suffix.lower() in TABLE_SUFFIXES and not _NO_TABLE.search(f.stem)]
     for series in _series(tables)[:_MOST_TABLES]:
         try:

@@ -8,11 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import se3
+from hecbench.errors import InputError
 from hecbench.lens import normalised
 from hecbench.recording import CameraModel
 from hecbench.se3 import Array
 from hecbench_hardware.lab.gl import Canvas
-from hecbench_hardware.lab.scene import Scene
+from hecbench_hardware.lab.scene import FAR_M, NEAR_M, Scene
 
 Image = NDArray[np.uint8]
 
@@ -80,6 +81,17 @@ class Eye:
         drawn = self._drawn(self._pinhole, base_T_camera, segmented=True)
         covered = self.scene.is_robot(drawn).astype(np.uint8) * np.uint8(255)
         return np.asarray(self._reduced(covered) > 127)
+
+    def depth(self, base_T_camera: Array) -> NDArray[np.float32]:
+        """(H, W) m along the optical axis, without noise, at the pixels' centres; for cameras without distortion.
+
+        Raises:
+            InputError: the camera has distortion.
+        """
+        if self._map is not None:
+            raise InputError("the lab draws depth for cameras without distortion only")
+        size = self.camera.width, self.camera.height
+        return self._canvas.depth(self.scene.view(self.camera, base_T_camera), *size, NEAR_M, FAR_M)
 
     def _drawn(self, pinhole: CameraModel, base_T_camera: Array, *, segmented: bool = False) -> Image:
         view = self.scene.view(pinhole, base_T_camera, segmented=segmented)

@@ -56,6 +56,7 @@ class Canvas:
         model.vis.global_.offwidth, model.vis.global_.offheight = width, height
         self._renderer = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100)
         mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN, self._renderer)
+        self._reversed = self._renderer.readDepthMap == mujoco.mjtDepthMap.mjDEPTH_ZEROFAR
         if (self._renderer.offWidth, self._renderer.offHeight) != (width, height):
             self.close()
             raise HecbenchError(f"this machine's OpenGL cannot draw {width}x{height} px: supersample less")
@@ -70,6 +71,18 @@ class Canvas:
         mujoco.mjr_render(viewport, view, self._renderer)
         mujoco.mjr_readPixels(image, None, viewport, self._renderer)
         return image[::-1]
+
+    def depth(self, view: Any, width: int, height: int, near_m: float, far_m: float) -> NDArray[np.float32]:
+        """(height, width) m along the optical axis, `far_m` where nothing is."""
+        import mujoco
+
+        self._context.make_current()
+        stored = np.empty((height, width), np.float32)
+        viewport = mujoco.MjrRect(0, 0, width, height)
+        mujoco.mjr_render(viewport, view, self._renderer)
+        mujoco.mjr_readPixels(None, stored, viewport, self._renderer)
+        away = stored[::-1] if self._reversed else 1 - stored[::-1]
+        return np.asarray(near_m * far_m / (near_m + away * (far_m - near_m)), np.float32)
 
     def close(self) -> None:
         """Give the context back. May be called twice."""

@@ -13,15 +13,19 @@ from hecbench.se3 import Array
 from hecbench.targets import AprilTagTarget
 from hecbench_hardware import tag_edges, tags
 from hecbench_hardware.clearance import check_pose
-from hecbench_hardware.lab.cells import Station, camera_model, ur5e
+from hecbench_hardware.lab.cells import DISTANCE_M, Station, camera_model, ur5e
 from hecbench_hardware.lab.eye import Eye, Sensor
 from hecbench_hardware.lab.scene import FlangeTag
+from hecbench_hardware.lab.stereo import StereoSensor
 
 _TRIES = 4000
 _SENSOR = Sensor(supersample=2, noise=2.0)
 _PHOTOGRAPH = Sensor(supersample=2, noise=5.0)
 _START_ERROR = np.array([0.05] * 3 + [0.08] * 3)
 _VIEW_SPREAD_RAD = np.deg2rad(10.0)
+_DEPTH_SPREAD_RAD = np.deg2rad(30.0)
+_DEPTH_DISTANCE_M = 1.3
+"""Stereo cameras see a robot well up to here."""
 
 
 @dataclass(frozen=True)
@@ -125,6 +129,39 @@ def photograph_recording(
     room = int(np.random.default_rng([seed, calibration, 3]).integers(1, 2**31))
     drawn = view_recording(calibration, seed, station, samples, sensor=_PHOTOGRAPH, room=room)
     return replace(drawn, name=f"lab_photographs_{calibration:02d}", masks=None)
+
+
+def depth_recording(
+    calibration: int, seed: int = 0, station: Station | None = None, samples: int = 9
+) -> Recording:
+    """Pictures, masks and depth of a stereo camera, nearer than the lab's own, with a start some centimetres off."""
+    station, camera = station or ur5e(), camera_model(640, 480, 606.0)
+    rng = np.random.default_rng([seed, calibration, 4])
+    centre = station.configuration_rad(calibration)
+    joints = centre + rng.uniform(-_DEPTH_SPREAD_RAD, _DEPTH_SPREAD_RAD, (samples, len(centre)))
+    base_T_camera = _nearer(station, station.camera_pose(calibration))
+    recording = described(station, f"lab_depth_{calibration:02d}", joints, base_T_camera, camera)
+    start = se3.exp(rng.uniform(-1, 1, 6) * _START_ERROR) @ base_T_camera
+    drawn = with_pictures(
+        replace(recording, initial_parent_T_camera=start), station, rng, room=int(rng.integers(1, 2**31))
+    )
+    stereo = StereoSensor()
+    eye = Eye(station.scene(room=0), camera, Sensor(1))
+    try:
+        depths = []
+        for row in joints:
+            eye.scene.place(row)
+            depths.append(stereo(eye.depth(base_T_camera), float(camera.intrinsics[0, 0]), rng))
+    finally:
+        eye.close()
+    return replace(drawn, depths=tuple(depths))
+
+
+def _nearer(station: Station, base_T_camera: Array) -> Array:
+    """The camera moved along its view until it is `_DEPTH_DISTANCE_M` from what it looks at."""
+    nearer = base_T_camera.copy()
+    nearer[:3, 3] += (DISTANCE_M - _DEPTH_DISTANCE_M) * base_T_camera[:3, 2]
+    return nearer
 
 
 def with_pictures(

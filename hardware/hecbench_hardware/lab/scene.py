@@ -25,7 +25,8 @@ _TABLE_HALF_M = (0.8, 0.9, 0.02)
 _TABLE_CENTRE_M = (0.45, 0.0)
 _WALL_DISTANCE_M = 1.6
 _CLUTTER = 14
-_NEAR_M, _FAR_M = 0.1, 30.0
+NEAR_M, FAR_M = 0.1, 30.0
+"""What is drawn, along the optical axis."""
 _PLATE_BEHIND_TAG_M = 3e-4
 
 
@@ -144,10 +145,10 @@ class Scene:
         top, bottom = (0.5 + cy) / fy, (0.5 + cy - camera.height) / fy
         for eye in self._view.camera:
             eye.pos, eye.forward, eye.up = base_T_camera[:3, 3], base_T_camera[:3, 2], -base_T_camera[:3, 1]
-            eye.frustum_near, eye.frustum_far = _NEAR_M, _FAR_M
-            eye.frustum_top, eye.frustum_bottom = _NEAR_M * top, _NEAR_M * bottom
-            eye.frustum_center = _NEAR_M * (left + right) / 2
-            eye.frustum_width = _NEAR_M * (right - left) / 2
+            eye.frustum_near, eye.frustum_far = NEAR_M, FAR_M
+            eye.frustum_top, eye.frustum_bottom = NEAR_M * top, NEAR_M * bottom
+            eye.frustum_center = NEAR_M * (left + right) / 2
+            eye.frustum_width = NEAR_M * (right - left) / 2
         self._view.flags[mujoco.mjtRndFlag.mjRND_SEGMENT] = segmented
         self._view.flags[mujoco.mjtRndFlag.mjRND_IDCOLOR] = segmented
         return self._view

@@ -9,7 +9,7 @@ from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import DeviceSpec, Kind, SuiteSpec
 
-MARKERS, VIEWS, PHOTOGRAPHS = "markers", "views", "photographs"
+MARKERS, VIEWS, PHOTOGRAPHS, DEPTH = "markers", "views", "photographs", "depth"
 
 
 def open_lab(options: Mapping[str, str]) -> Any:
@@ -28,6 +28,7 @@ def make(level: str, index: int, seed: int) -> Any:
         MARKERS: recordings.marker_recording,
         VIEWS: recordings.view_recording,
         PHOTOGRAPHS: recordings.photograph_recording,
+        DEPTH: recordings.depth_recording,
     }
     return makers[level](index, seed)
 
@@ -51,9 +52,9 @@ def hecbench_suites() -> Iterable[SuiteSpec]:
     """Marker calibrations and pictures of the arm."""
     yield SuiteSpec(
         name="lab",
-        summary="drawn in the virtual lab: 10 poses with a tag, or 10 configurations with masks or without",
+        summary="drawn in the virtual lab: poses with a tag, or pictures of the arm with masks, without, or with depth",
         imports=("mujoco",),
-        levels=(MARKERS, VIEWS, PHOTOGRAPHS),
+        levels=(MARKERS, VIEWS, PHOTOGRAPHS, DEPTH),
         default_samples=18,
         make=make,
     )

@@ -1,0 +1,178 @@
+"""`depth_icp`: the rendered robot aligned with depth pictures, point to plane, all views in one camera.
+
+Projective association after Blais and Levine 1995 and the point-to-plane error of Chen and Medioni 1992, as roboreg
+uses them on a GPU (Huber et al. 2025, "Hydra: marker-free RGB-D hand-eye calibration"); derived anew: the drawn robot
+gives point and plane of every pixel, so no neighbours are searched. Gauss-Newton with Tukey's weights, coarse to fine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hecbench import se3
+from hecbench.errors import Refusal, SolverFailure
+from hecbench.estimate import Estimate, Termination
+from hecbench.recording import Mounting, Recording
+from hecbench.se3 import Array
+from hecbench_plugins.depth.settings import DepthSettings, Stage
+from hecbench_plugins.depth.starts import around, on_a_sphere
+from hecbench_plugins.depth.views import FEWEST_VIEWS, Agreement, DepthViews
+from hecbench_plugins.maskless.align import limited
+from hecbench_plugins.second_order.descent import Trace
+from hecbench_plugins.second_order.silhouette import distances_at, silhouette_step
+from hecbench_plugins.views.pyramid import prepare
+
+_SETTLED = 1e-5
+"""rad and m of a step, at which a stage ends: far below any noise."""
+_CLIP_PX = 3.0
+"""Of a mask's contour, from which on a crossing counts less."""
+
+
+@dataclass(frozen=True, eq=False)
+class _End:
+    """Where a descent ended."""
+
+    camera_T_parent: Array
+    agreement: Agreement
+    information: Array
+    iterations: int
+
+
+@dataclass(frozen=True)
+class DepthIcp:
+    """The options of the method.
+
+    Attributes:
+        silhouette: use the recording's masks too, in the last steps.
+        settings: the numbers.
+    """
+
+    silhouette: bool = False
+    settings: DepthSettings = field(default_factory=DepthSettings)
+
+    def __call__(self, recording: Recording, *, rng: np.random.Generator) -> Estimate:
+        """Calibrate from the recording's start, or from all over a view sphere when there is none."""
+        views = DepthViews.of(recording)
+        views.robot.check_start(recording)
+        fixed = recording.mounting is Mounting.EYE_TO_HAND and len(views) >= FEWEST_VIEWS
+        settings = self.settings
+        arguments = settings.moved_m, settings.noise_per_m, settings.search_level
+        moved = views.moved(*arguments) if fixed else None
+        best: _End | None = None
+        followed = 0
+        for start in self._starts(recording, views, rng):
+            followed += 1
+            end = self._descended(views, start, self.settings.stages)
+            if best is None or end.agreement.agreeing - end.agreement.beyond > (
+                best.agreement.agreeing - best.agreement.beyond
+            ):
+                best = end
+            if self._is_right(end, views, moved):
+                break
+        if best is None:
+            raise Refusal(
+                "no start: give initial_parent_T_camera, --init FILE, or three views of a fixed camera"
+            )
+        if not self._is_right(best, views, moved):
+            raise SolverFailure(_why_not(best.agreement, followed, self.settings))
+        if self.silhouette:
+            best = self._with_masks(recording, views, best)
+        return self._answer(views, best, followed)
+
+    def _starts(self, recording: Recording, views: DepthViews, rng: np.random.Generator) -> Iterator[Array]:
+        start = recording.initial_parent_T_camera
+        if start is not None:
+            yield se3.inverse(start)
+            yield from around(views, start, self.settings, rng)
+        elif recording.mounting is Mounting.EYE_TO_HAND:
+            yield from on_a_sphere(views, self.settings)
+
+    def _descended(self, views: DepthViews, pose: Array, stages: tuple[Stage, ...]) -> _End:
+        settings, noise, iterations = self.settings, self.settings.noise_per_m, 0
+        A = np.zeros((6, 6))
+        for stage in stages:
+            for _ in range(stage.iterations):
+                iterations += 1
+                A, b, _, count = views.normal_equations(
+                    pose, stage.level, stage.limit_m, noise, settings.floor_m, settings.grazing
+                )
+                if count < settings.least_pixels / stage.level**2:
+                    break
+                move = np.linalg.solve(A + 1e-6 * np.diag(np.diag(A)) + 1e-9 * np.eye(6), b)
+                pose = se3.exp(limited(move)) @ pose
+                if np.abs(move).max() < _SETTLED:
+                    break
+            if stage.level <= 2 and np.isfinite(found := views.noise(pose, 4 * stage.limit_m)):
+                noise = float(np.clip(found, 0.1 * settings.noise_per_m, 4 * settings.noise_per_m))
+        fit = views.agreement(pose, range(len(views)), 2, noise, settings.agreeing_m, settings.beyond_m)
+        return _End(pose, fit, A / settings.correlated_pixels, iterations)
+
+    def _is_right(self, end: _End, views: DepthViews, moved: NDArray[np.float32] | None) -> bool:
+        settings, fit = self.settings, end.agreement
+        if fit.pixels < settings.least_pixels / 4:
+            return False
+        if fit.agreeing < settings.least_agreeing or fit.beyond > settings.most_beyond:
+            return False
+        if moved is None:
+            return True
+        return views.explained(end.camera_T_parent, moved, settings.search_level) >= settings.least_explained
+
+    def _with_masks(self, recording: Recording, views: DepthViews, end: _End) -> _End:
+        """Further steps on depth and the masks' contours together."""
+        if recording.masks is None:
+            raise Refusal("silhouette=true needs masks: samples[].mask, or --segmenter")
+        _, masked = prepare(recording)
+        step, last = (
+            silhouette_step(masked, 1, distances_at(masked, 1), _CLIP_PX, Trace()),
+            self.settings.stages[-1],
+        )
+        pose, settings, information = end.camera_T_parent, self.settings, end.information
+        for _ in range(2 * last.iterations):
+            A, b, _, _ = views.normal_equations(
+                pose, last.level, last.limit_m, settings.noise_per_m, settings.floor_m, settings.grazing
+            )
+            _, contour_A, contour_b = step(pose)
+            information = A / settings.correlated_pixels + contour_A / settings.mask_sigma_px**2
+            gradient = b / settings.correlated_pixels + contour_b / settings.mask_sigma_px**2
+            move = np.linalg.solve(information + 1e-9 * np.eye(6), gradient)
+            pose = se3.exp(limited(move)) @ pose
+            if np.abs(move).max() < _SETTLED:
+                break
+        return _End(pose, end.agreement, information, end.iterations + 2 * last.iterations)
+
+    def _answer(self, views: DepthViews, end: _End, followed: int) -> Estimate:
+        carried = se3.adjoint(se3.inverse(end.camera_T_parent))
+        covariance = carried @ np.linalg.inv(end.information + 1e-9 * np.eye(6)) @ carried.T
+        details: dict[str, Any] = {
+            "stage": "depth",
+            "agreeing": end.agreement.agreeing,
+            "beyond": end.agreement.beyond,
+            "starts": followed,
+            "views": len(views),
+        }
+        if views.notes:
+            details["left_out"] = list(views.notes)
+        return Estimate(
+            se3.inverse(end.camera_T_parent),
+            covariance=(covariance + covariance.T) / 2,
+            termination=Termination.CONVERGED,
+            iterations=end.iterations,
+            renders=views.renders,
+            diagnostics=details,
+        )
+
+
+def _why_not(fit: Agreement, followed: int, settings: DepthSettings) -> str:
+    if fit.pixels < settings.least_pixels / 4:
+        return "the robot is not in the depth pictures where the start puts it: check the start, the units and the size"
+    return (
+        f"depth agrees with {100 * fit.agreeing:.0f} % of the drawn robot ({100 * settings.least_agreeing:.0f} % are"
+        f" needed) and passes through {100 * fit.beyond:.0f} % of it at the best of {followed} ends: the camera is"
+        " farther off than the start says, depth is in other units or not aligned with the camera of K, or the robot or"
+        " its joints are not those of the pictures"
+    )
