@@ -34,7 +34,7 @@ class DepthSettings:
         least_agreeing, most_beyond: shares of the drawn pixels with depth, those with something before the robot left
             out, for an end to be an answer.
         least_pixels: drawn pixels with depth in all views.
-        correlated_pixels: that say as much as one: the matching window of a stereo camera.
+        correlated_pixels: that say as much as one: a few matching windows of a stereo camera.
         draws, followed: poses drawn around a start, and how many of the best are followed.
         search_level, search_views: size and number of the pictures that draws are compared with.
         sphere_deg, sphere_starts: of a search without a start: spacing of its directions, and starts followed.
@@ -55,10 +55,10 @@ class DepthSettings:
     grazing: float = 0.25
     agreeing_m: float = 0.01
     beyond_m: float = 0.05
-    least_agreeing: float = 0.6
+    least_agreeing: float = 0.85
     most_beyond: float = 0.12
     least_pixels: int = 500
-    correlated_pixels: float = 25.0
+    correlated_pixels: float = 70.0
     draws: int = 400
     followed: int = 8
     search_level: int = 8
