@@ -19,7 +19,8 @@ import cv2
 import numpy as np
 from hecbench_hardware.lab.cells import camera_model, looking_at, ur5e
 from hecbench_hardware.lab.eye import Eye, Sensor
-from hecbench_plugins.watching.watch import Verdict, Watch
+from hecbench_plugins.watching.state import Verdict
+from hecbench_plugins.watching.watch import Watch
 from scipy import stats
 
 from hecbench import se3

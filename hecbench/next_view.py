@@ -135,8 +135,7 @@ def information_of(estimate: Estimate) -> Array:
     """
     if estimate.parent_T_camera is None or estimate.covariance is None:
         raise InputError(f"{estimate.solver}: has no covariance, so that what it knows cannot be told")
-    carried = se3.adjoint(se3.inverse(estimate.parent_T_camera))
-    return np.asarray(np.linalg.inv(carried @ estimate.covariance @ carried.T))
+    return np.asarray(np.linalg.inv(se3.inverse_covariance(estimate.parent_T_camera, estimate.covariance)))
 
 
 def prior_information() -> Array:

@@ -144,6 +144,13 @@ def adjoint(a_T_b: ArrayLike) -> Array:
     return ad
 
 
+def inverse_covariance(a_T_b: ArrayLike, covariance: ArrayLike) -> Array:
+    """Covariance (6, 6) of the left perturbation of inverse(a_T_b), from that of a_T_b itself."""
+    carried = adjoint(inverse(a_T_b))
+    found = carried @ np.asarray(covariance) @ carried.T
+    return np.asarray((found + found.T) / 2)
+
+
 def nearest_rotation(matrix: ArrayLike) -> Array:
     """The proper rotations nearest to matrices (..., 3, 3) in the Frobenius norm (Kabsch 1976)."""
     u, _, vt = np.linalg.svd(np.asarray(matrix, float))

@@ -192,11 +192,7 @@ class ArucoGridTarget(MarkersTarget):
     @cached_property
     def points_m(self) -> Array:
         """(4 columns rows, 3) m in the board's frame."""
-        corners = (
-            np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]]) * self.marker_m
-        )
-        places = _grid(self.columns, self.rows, self.marker_m + self.gap_m)
-        return (places[:, None] + corners).reshape(-1, 3)
+        return _squares(self.columns, self.rows, self.marker_m, self.marker_m + self.gap_m)
 
 
 @dataclass(frozen=True)
@@ -234,9 +230,11 @@ class AprilGridTarget(MarkersTarget):
     @cached_property
     def points_m(self) -> Array:
         """(4 columns rows, 3) m in the grid's frame."""
-        corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]]) * self.tag_m
-        places = _grid(self.columns, self.rows, self.tag_m * (1 + self.spacing))
-        return (places[:, None] + corners).reshape(-1, 3)
+        return _squares(self.columns, self.rows, self.tag_m, self.tag_m * (1 + self.spacing))
+
+
+DECLARED = (ChessboardTarget, CharucoTarget, AprilTagTarget, ArucoTarget, ArucoGridTarget, AprilGridTarget)
+"""The targets that are described by their fields, as files name them, rather than point by point."""
 
 
 def grid_shape(points_m: Array) -> tuple[int, int] | None:
@@ -256,6 +254,12 @@ def grid_shape(points_m: Array) -> tuple[int, int] | None:
 def _grid(columns: int, rows: int, spacing_m: float) -> Array:
     y, x = np.mgrid[:rows, :columns]
     return np.stack([x.ravel(), y.ravel(), np.zeros(rows * columns)], 1) * spacing_m
+
+
+def _squares(columns: int, rows: int, side_m: float, pitch_m: float) -> Array:
+    """(4 columns rows, 3) m: the corners of each square around it, from the one nearest to the origin along x."""
+    corners = side_m * np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])
+    return np.asarray((_grid(columns, rows, pitch_m)[:, None] + corners).reshape(-1, 3))
 
 
 def _positive(name: str, value: float) -> None:

@@ -75,11 +75,8 @@ def load(path: Path) -> Recording:
         notes.append(
             f"{path}: {why}: they are calibrated from the pictures; or write camera into {HINTS_NAME}"
         )
-    target = hinted_target(hints, hints_file)
-    beside = files_in(path if path.is_dir() else path.parent, *YAML_SUFFIXES)
-    if target is None and (described := kalibr.target_in(beside)) is not None:
-        target = described[0]
-        notes.append(f"{path}: target from {described[1].name}")
+    beside = files_in(hints_file.parent, *YAML_SUFFIXES)
+    target = hinted_target(hints, hints_file) or kalibr.target_in(beside, notes)
     if target is None and hints.mounting is None:
         raise InputError(
             f"{path}: {len(images)} still moments seen in {topic}; {seen_target(images)} into {hints_file}, or "

@@ -19,16 +19,7 @@ from hecbench.lens import OPENCV, CameraModel
 from hecbench.recording import ImageSource, Mounting, Recording, RobotDescription
 from hecbench.robots import urdf_files
 from hecbench.system import files, pictures
-from hecbench.targets import (
-    AprilGridTarget,
-    AprilTagTarget,
-    ArucoGridTarget,
-    ArucoTarget,
-    CharucoTarget,
-    ChessboardTarget,
-    PointsTarget,
-    Target,
-)
+from hecbench.targets import DECLARED, PointsTarget, Target
 
 SCHEMA = "hecbench.recording/1"
 FILE_NAME = "recording.json"
@@ -223,21 +214,10 @@ def _target(parsed: _Target | None) -> Target | None:
             return None
         case _Points(points_m=points_m):
             return PointsTarget(tuple(tuple(point) for point in points_m))
-        case _Chessboard():
-            return ChessboardTarget(parsed.columns, parsed.rows, parsed.square_m)
-        case _Charuco():
-            sizes = parsed.columns, parsed.rows, parsed.square_m, parsed.marker_m
-            return CharucoTarget(*sizes, parsed.dictionary, bool(parsed.legacy))
-        case _AprilTag():
-            return AprilTagTarget(parsed.family, parsed.id, parsed.size_m)
-        case _Aruco():
-            return ArucoTarget(parsed.dictionary, parsed.id, parsed.size_m)
-        case _ArucoGrid():
-            lengths = parsed.marker_m, parsed.gap_m
-            return ArucoGridTarget(parsed.columns, parsed.rows, *lengths, parsed.dictionary, parsed.first_id)
-        case _AprilGrid():
-            lengths = parsed.tag_m, parsed.spacing
-            return AprilGridTarget(parsed.columns, parsed.rows, *lengths, parsed.family, parsed.first_id)
+        case _:
+            given = {key: value for key, value in msgspec.structs.asdict(parsed).items() if value is not None}
+            kinds = {target.kind: target for target in DECLARED}
+            return kinds[str(parsed.__struct_config__.tag)](**given)
 
 
 def _array(name: str, value: Any) -> NDArray[np.float64]:

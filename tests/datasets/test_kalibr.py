@@ -52,9 +52,9 @@ def picture(folder, size=(752, 480)):
     ],
 )
 def test_targets(tmp_path, text, expected):
-    found, file = kalibr.target_in(written(tmp_path, "target.yaml", text))
-    assert found == expected
-    assert file == tmp_path / "target.yaml"
+    notes = []
+    assert kalibr.target_in(written(tmp_path, "target.yaml", text), notes) == expected
+    assert notes == [f"{tmp_path}: target from target.yaml"]
 
 
 @pytest.mark.parametrize(
@@ -71,11 +71,11 @@ def test_targets(tmp_path, text, expected):
 )
 def test_wrong_targets_are_named(tmp_path, text, message):
     with pytest.raises(InputError, match=message):
-        kalibr.target_in(written(tmp_path, "target.yaml", text))
+        kalibr.target_in(written(tmp_path, "target.yaml", text), [])
 
 
 def test_a_file_for_others_is_none(tmp_path):
-    assert kalibr.target_in(written(tmp_path, "robot.yaml", "name: arm\n")) is None
+    assert kalibr.target_in(written(tmp_path, "robot.yaml", "name: arm\n"), []) is None
 
 
 @pytest.mark.parametrize(("lens", "model"), [("radtan", "opencv"), ("equidistant", EQUIDISTANT)])
@@ -101,6 +101,12 @@ def test_chains_of_other_cameras_are_named(tmp_path, text, size, message):
     camera, (note,) = cameras.camera_in(written(tmp_path, "camchain.yaml", text), picture(tmp_path, size))
     assert camera is None
     assert message in note
+
+
+def test_a_camera_model_is_not_yet_kalibr(tmp_path):
+    text = "camera_model: pinhole\nfx: 400\nfy: 401\ncx: 320\ncy: 240\n"
+    camera, _ = cameras.camera_in(written(tmp_path, "camera.yaml", text), picture(tmp_path, (640, 480)))
+    np.testing.assert_allclose(np.diag(camera.K), [400, 401, 1])
 
 
 def test_an_equidistant_camera_info(tmp_path):

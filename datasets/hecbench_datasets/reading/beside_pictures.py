@@ -51,10 +51,7 @@ def load_beside_pictures(
     """
     beside = _paired(found, stream, poses, hints)
     camera, notes = _camera(found, beside.images[0], hints)
-    target = hinted_target(hints, file)
-    if target is None and (described := kalibr.target_in(found.files)) is not None:
-        target = described[0]
-        notes.append(f"{found.path}: target from {described[1].name}")
+    target = hinted_target(hints, file) or kalibr.target_in(found.files, notes)
     robots = _robots(found, hints)
     told = hints.mounting is not None and (hints.robot_rotation is not None or _is_matrix(poses))
     if target is None and not told:

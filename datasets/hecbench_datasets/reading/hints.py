@@ -12,19 +12,8 @@ from hecbench.errors import InputError
 from hecbench.exchange.conventions import HINTS_NAME
 from hecbench.lens import OPENCV, CameraModel
 from hecbench.recording import Mounting
-from hecbench.targets import (
-    AprilGridTarget,
-    AprilTagTarget,
-    ArucoGridTarget,
-    ArucoTarget,
-    CharucoTarget,
-    ChessboardTarget,
-    PointsTarget,
-    Target,
-)
+from hecbench.targets import DECLARED, ChessboardTarget, PointsTarget, Target
 from hecbench_datasets.reading.sources import yaml_value
-
-_KINDS = (ChessboardTarget, CharucoTarget, AprilTagTarget, ArucoTarget, ArucoGridTarget, AprilGridTarget)
 
 
 class Camera(msgspec.Struct, forbid_unknown_fields=True):
@@ -90,14 +79,14 @@ def hinted_target(hints: Hints, file: Path) -> Target | None:
             return circle_grid(**values)
         if kind == "points":
             return PointsTarget.of(np.array(values["points_m"], float).reshape(-1, 3))
-        for known in _KINDS:
+        for known in DECLARED:
             if kind == known.kind:
                 return known(**values)
     except (TypeError, KeyError, ValueError) as error:
         raise InputError(f"{file}: target: {error}") from error
     except InputError as error:
         raise InputError(f"{file}: {error}") from error
-    kinds = ", ".join(known.kind for known in _KINDS)
+    kinds = ", ".join(known.kind for known in DECLARED)
     raise InputError(f"{file}: target.kind: '{kind}'; use {kinds}, circles or points")
 
 

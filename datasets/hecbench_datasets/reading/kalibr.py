@@ -17,11 +17,12 @@ from hecbench.lens import EQUIDISTANT, OPENCV, CameraModel
 from hecbench.targets import AprilGridTarget, ChessboardTarget, PointsTarget, Target
 from hecbench_datasets.reading.sources import YAML_SUFFIXES, yaml_value
 
+_KEYS = {"camera_model", "intrinsics"}
 _LENSES = {"radtan": OPENCV, "equidistant": EQUIDISTANT, "none": OPENCV}
 
 
-def target_in(files: list[Path]) -> tuple[Target, Path] | None:
-    """The target of the first file that describes one for Kalibr, and that file.
+def target_in(files: list[Path], notes: list[str]) -> Target | None:
+    """The target of the first file that describes one for Kalibr; `notes` then say which.
 
     Raises:
         InputError: a number of it is missing or wrong.
@@ -31,12 +32,11 @@ def target_in(files: list[Path]) -> tuple[Target, Path] | None:
             continue
         try:
             content = yaml_value(file)
-        except (
-            InputError
-        ):  # not every YAML file in a folder is for us; one that is read says its faults below
+        except InputError:  # most YAML files of a folder are not for us
             continue
         if isinstance(content, Mapping) and "target_type" in content:
-            return _target(content, file), file
+            notes.append(f"{file.parent}: target from {file.name}")
+            return _target(content, file)
     return None
 
 
@@ -69,12 +69,10 @@ def camera(content: Any, size: tuple[int, int]) -> CameraModel | None:
     Raises:
         InputError: its projection or its lens is none of ours, or its size is not that of the pictures.
     """
-    chain = (
-        [entry for key, entry in content.items() if str(key).startswith("cam")]
-        if isinstance(content, Mapping)
-        else []
-    )
-    entries = [entry for entry in [*chain, content] if isinstance(entry, Mapping) and "camera_model" in entry]
+    if not isinstance(content, Mapping):
+        return None
+    chain = [entry for key, entry in content.items() if str(key).startswith("cam")]
+    entries = [entry for entry in [*chain, content] if isinstance(entry, Mapping) and entry.keys() >= _KEYS]
     if not entries:
         return None
     fitting = [entry for entry in entries if tuple(entry.get("resolution", size)) == size]

@@ -21,8 +21,9 @@ _DICTIONARIES = (
     "DICT_ARUCO_ORIGINAL",
     *_FAMILIES,
 )
-_KALIBR_SUFFIX = " with a border of two cells"
-_KALIBR = f"DICT_APRILTAG_36h11{_KALIBR_SUFFIX}"
+_KALIBR_BORDER = 2
+"""Cells of the black border of Kalibr's tags; all others have one."""
+_READINGS = (*((name, 1) for name in _DICTIONARIES), ("DICT_APRILTAG_36h11", _KALIBR_BORDER))
 _BOARD_FROM = 4
 """Markers in one picture that make a board rather than a few tags."""
 
@@ -62,34 +63,33 @@ def _chessboard(greys: Sequence[NDArray[np.uint8]]) -> str | None:
 def _markers(greys: Sequence[NDArray[np.uint8]]) -> str | None:
     import cv2
 
-    best: tuple[int, str, int] = 0, "", 0
-    kalibr = cv2.aruco.DetectorParameters()
-    kalibr.markerBorderBits = 2
-    for name in (*_DICTIONARIES, _KALIBR):
-        parameters = kalibr if name == _KALIBR else cv2.aruco.DetectorParameters()
-        code = getattr(cv2.aruco, name.removesuffix(_KALIBR_SUFFIX))
-        detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(code), parameters)
+    best: tuple[int, str, int, int] = 0, "", 0, 1
+    for name, border in _READINGS:
+        parameters = cv2.aruco.DetectorParameters()
+        parameters.markerBorderBits = border
+        dictionary = cv2.aruco.getPredefinedDictionary(getattr(cv2.aruco, name))
+        detector = cv2.aruco.ArucoDetector(dictionary, parameters)
         counts = [
             0 if (ids := detector.detectMarkers(grey)[1]) is None else len(np.unique(ids)) for grey in greys
         ]
-        best = max(best, (sum(counts), name, max(counts)))
-    total, name, most = best
+        best = max(best, (sum(counts), name, max(counts), border))
+    total, name, most, border = best
     if total < len(greys) / 2:
         return None
-    if name == _KALIBR or (most >= _BOARD_FROM and name in _FAMILIES):
-        family = _FAMILIES[name.removesuffix(_KALIBR_SUFFIX)]
+    family = _FAMILIES.get(name)
+    if family and (border == _KALIBR_BORDER or most >= _BOARD_FROM):
         return (
             f"they show up to {most} tags of {family}: write target: {{kind: aprilgrid, columns: C, rows: R, tag_m: S, "
             f"spacing: G, family: {family}}} with the side S of a tag in m and the white between two over it"
         )
-    if most < _BOARD_FROM and name not in _FAMILIES:
+    if most < _BOARD_FROM and not family:
         return (
             f"they show markers of {name}: write target: {{kind: aruco, dictionary: {name}, id: N, size_m: S}} with "
             "the side S of the black square in m"
         )
     if most < _BOARD_FROM:
         return (
-            f"they show tags of {_FAMILIES[name]}: write target: {{kind: apriltag, family: {_FAMILIES[name]}, id: -1, "
+            f"they show tags of {family}: write target: {{kind: apriltag, family: {family}, id: -1, "
             "size_m: S} with the side S of the black square in m"
         )
     return (

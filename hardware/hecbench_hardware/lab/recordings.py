@@ -142,19 +142,8 @@ def depth_recording(
     base_T_camera = _nearer(station, station.camera_pose(calibration))
     recording = described(station, f"lab_depth_{calibration:02d}", joints, base_T_camera, camera)
     start = se3.exp(rng.uniform(-1, 1, 6) * _START_ERROR) @ base_T_camera
-    drawn = with_pictures(
-        replace(recording, initial_parent_T_camera=start), station, rng, room=int(rng.integers(1, 2**31))
-    )
-    stereo = StereoSensor()
-    eye = Eye(station.scene(room=0), camera, Sensor(1))
-    try:
-        depths = []
-        for row in joints:
-            eye.scene.place(row)
-            depths.append(stereo(eye.depth(base_T_camera), float(camera.intrinsics[0, 0]), rng))
-    finally:
-        eye.close()
-    return replace(drawn, depths=tuple(depths))
+    started = replace(recording, initial_parent_T_camera=start)
+    return with_pictures(started, station, rng, room=int(rng.integers(1, 2**31)), stereo=StereoSensor())
 
 
 def _nearer(station: Station, base_T_camera: Array) -> Array:
@@ -165,20 +154,28 @@ def _nearer(station: Station, base_T_camera: Array) -> Array:
 
 
 def with_pictures(
-    recording: Recording, station: Station, rng: np.random.Generator, sensor: Sensor = _SENSOR, room: int = 0
+    recording: Recording,
+    station: Station,
+    rng: np.random.Generator,
+    sensor: Sensor = _SENSOR,
+    room: int = 0,
+    stereo: StereoSensor | None = None,
 ) -> Recording:
-    """The recording with a picture and a mask of the arm for each of its samples, seen from its truth."""
+    """The recording with a picture and a mask of the arm for each of its samples, seen from its truth; and depth."""
     present = recording.present
     eye = Eye(station.scene(room=room), present.camera, sensor)
-    images, masks = [], []
+    images, masks, depths = [], [], []
     try:
         for joints in present.joints_rad:
             eye.scene.place(joints)
             images.append(eye.image(present.truth_parent_T_camera, rng))
             masks.append(eye.mask(present.truth_parent_T_camera).astype(np.uint8) * np.uint8(255))
+            if stereo is not None:
+                exact = eye.depth(present.truth_parent_T_camera)
+                depths.append(stereo(exact, float(present.camera.intrinsics[0, 0]), rng))
     finally:
         eye.close()
-    return replace(recording, images=tuple(images), masks=tuple(masks))
+    return replace(recording, images=tuple(images), masks=tuple(masks), depths=tuple(depths) or None)
 
 
 def described(

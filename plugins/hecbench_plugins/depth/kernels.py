@@ -31,12 +31,10 @@ def add_pixels(drawn, depth, intrinsics, limit, noise, floor, grazing, A, b):
     The residual of a pixel is the distance of its measured point from the plane of the face drawn there. Its weight is
     one over its variance, by depth noise of ``noise z^2`` and a floor (m), times Tukey's weight for the limit: m, or
     four standard deviations where these are more. Faces seen at a smaller cosine than `grazing` are left out.
-
-    Returns:
-        Sums over the pixels used: weighted squares, weights, and their number.
+    Returns the number of pixels used.
     """
     fx, fy, cx, cy = intrinsics[0], intrinsics[1], intrinsics[2], intrinsics[3]
-    squares, weights, count = 0.0, 0.0, 0
+    count = 0
     row = np.empty(6)
     for y in range(drawn.box[2], drawn.box[3] + 1):
         ry = (y - cy) / fy
@@ -71,13 +69,11 @@ def add_pixels(drawn, depth, intrinsics, limit, noise, floor, grazing, A, b):
                 b[i] += weight * row[i] * residual
                 for j in range(i + 1):
                     A[i, j] += weight * row[i] * row[j]
-            squares += weight * residual * residual
-            weights += weight
             count += 1
     for i in range(6):
         for j in range(i):
             A[j, i] = A[i, j]
-    return squares, weights, count
+    return count
 
 
 @_jit
@@ -113,7 +109,7 @@ def relative_offsets(face, nearness, box, depth, limit, out):
     for y in range(box[2], box[3] + 1):
         for x in range(box[0], box[1] + 1):
             z = depth[y, x]
-            if face[y, x] < 0 or z <= 0 or count >= len(out):
+            if face[y, x] < 0 or z <= 0:
                 continue
             drawn_z = 1.0 / nearness[y, x]
             if abs(z - drawn_z) < limit:

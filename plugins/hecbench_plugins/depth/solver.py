@@ -19,7 +19,7 @@ from hecbench.errors import Refusal, SolverFailure
 from hecbench.estimate import Estimate, Termination
 from hecbench.recording import Mounting, Recording
 from hecbench.se3 import Array
-from hecbench_plugins.depth.settings import DepthSettings, Stage
+from hecbench_plugins.depth.settings import DepthSettings
 from hecbench_plugins.depth.starts import around, on_a_sphere
 from hecbench_plugins.depth.views import FEWEST_VIEWS, Agreement, DepthViews
 from hecbench_plugins.maskless.align import limited
@@ -57,50 +57,40 @@ class DepthIcp:
 
     def __call__(self, recording: Recording, *, rng: np.random.Generator) -> Estimate:
         """Calibrate from the recording's start, or from all over a view sphere when there is none."""
-        views = DepthViews.of(recording)
+        settings = self.settings
+        views = DepthViews.of(recording, settings)
         views.robot.check_start(recording)
         fixed = recording.mounting is Mounting.EYE_TO_HAND and len(views) >= FEWEST_VIEWS
-        settings = self.settings
-        arguments = settings.moved_m, settings.noise_per_m, settings.search_level
-        moved = views.moved(*arguments) if fixed else None
-        best: _End | None = None
-        followed = 0
+        moved = views.moved(settings.search_level) if fixed else None
+        ends: list[_End] = []
         for start in self._starts(recording, views, rng):
-            followed += 1
-            end = self._descended(views, start, self.settings.stages)
-            if best is None or end.agreement.agreeing - end.agreement.beyond > (
-                best.agreement.agreeing - best.agreement.beyond
-            ):
-                best = end
+            ends.append(end := self._descended(views, start))
             if self._is_right(end, views, moved):
-                break
-        if best is None:
+                if self.silhouette:
+                    end = self._with_masks(recording, views, end)
+                return self._answer(views, end, len(ends))
+        if not ends:
             raise Refusal(
                 "no start: give initial_parent_T_camera, --init FILE, or three views of a fixed camera"
             )
-        if not self._is_right(best, views, moved):
-            raise SolverFailure(_why_not(best.agreement, followed, self.settings))
-        if self.silhouette:
-            best = self._with_masks(recording, views, best)
-        return self._answer(views, best, followed)
+        best = max((end.agreement for end in ends), key=lambda fit: fit.agreeing - fit.beyond)
+        raise SolverFailure(_why_not(best, len(ends), settings))
 
     def _starts(self, recording: Recording, views: DepthViews, rng: np.random.Generator) -> Iterator[Array]:
         start = recording.initial_parent_T_camera
         if start is not None:
             yield se3.inverse(start)
-            yield from around(views, start, self.settings, rng)
+            yield from around(views, start, rng)
         elif recording.mounting is Mounting.EYE_TO_HAND:
-            yield from on_a_sphere(views, self.settings)
+            yield from on_a_sphere(views)
 
-    def _descended(self, views: DepthViews, pose: Array, stages: tuple[Stage, ...]) -> _End:
+    def _descended(self, views: DepthViews, pose: Array) -> _End:
         settings, noise, iterations = self.settings, self.settings.noise_per_m, 0
         A = np.zeros((6, 6))
-        for stage in stages:
+        for stage in settings.stages:
             for _ in range(stage.iterations):
                 iterations += 1
-                A, b, _, count = views.normal_equations(
-                    pose, stage.level, stage.limit_m, noise, settings.floor_m, settings.grazing
-                )
+                A, b, count = views.normal_equations(pose, stage, noise)
                 if count < settings.least_pixels / stage.level**2:
                     break
                 move = np.linalg.solve(A + 1e-6 * np.diag(np.diag(A)) + 1e-9 * np.eye(6), b)
@@ -109,7 +99,7 @@ class DepthIcp:
                     break
             if stage.level <= 2 and np.isfinite(found := views.noise(pose, 4 * stage.limit_m)):
                 noise = float(np.clip(found, 0.1 * settings.noise_per_m, 4 * settings.noise_per_m))
-        fit = views.agreement(pose, range(len(views)), 2, noise, settings.agreeing_m, settings.beyond_m)
+        fit = views.agreement(pose, range(len(views)), 2, noise)
         return _End(pose, fit, A / settings.correlated_pixels, iterations)
 
     def _is_right(self, end: _End, views: DepthViews, moved: NDArray[np.float32] | None) -> bool:
@@ -127,27 +117,23 @@ class DepthIcp:
         if recording.masks is None:
             raise Refusal("silhouette=true needs masks: samples[].mask, or --segmenter")
         _, masked = prepare(recording)
-        step, last = (
-            silhouette_step(masked, 1, distances_at(masked, 1), _CLIP_PX, Trace()),
-            self.settings.stages[-1],
-        )
-        pose, settings, information = end.camera_T_parent, self.settings, end.information
+        contour = silhouette_step(masked, 1, distances_at(masked, 1), _CLIP_PX, Trace())
+        settings, last = self.settings, self.settings.stages[-1]
+        pose, information, iterations = end.camera_T_parent, end.information, end.iterations
         for _ in range(2 * last.iterations):
-            A, b, _, _ = views.normal_equations(
-                pose, last.level, last.limit_m, settings.noise_per_m, settings.floor_m, settings.grazing
-            )
-            _, contour_A, contour_b = step(pose)
+            iterations += 1
+            A, b, _ = views.normal_equations(pose, last, settings.noise_per_m)
+            _, contour_A, contour_b = contour(pose)
             information = A / settings.correlated_pixels + contour_A / settings.mask_sigma_px**2
             gradient = b / settings.correlated_pixels + contour_b / settings.mask_sigma_px**2
             move = np.linalg.solve(information + 1e-9 * np.eye(6), gradient)
             pose = se3.exp(limited(move)) @ pose
             if np.abs(move).max() < _SETTLED:
                 break
-        return _End(pose, end.agreement, information, end.iterations + 2 * last.iterations)
+        return _End(pose, end.agreement, information, iterations)
 
     def _answer(self, views: DepthViews, end: _End, followed: int) -> Estimate:
-        carried = se3.adjoint(se3.inverse(end.camera_T_parent))
-        covariance = carried @ np.linalg.inv(end.information + 1e-9 * np.eye(6)) @ carried.T
+        covariance = np.linalg.inv(end.information + 1e-9 * np.eye(6))
         details: dict[str, Any] = {
             "stage": "depth",
             "agreeing": end.agreement.agreeing,
@@ -159,7 +145,7 @@ class DepthIcp:
             details["left_out"] = list(views.notes)
         return Estimate(
             se3.inverse(end.camera_T_parent),
-            covariance=(covariance + covariance.T) / 2,
+            covariance=se3.inverse_covariance(end.camera_T_parent, covariance),
             termination=Termination.CONVERGED,
             iterations=end.iterations,
             renders=views.renders,

@@ -9,27 +9,20 @@ from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.se3 import Array
-from hecbench_plugins.depth.settings import DepthSettings
 from hecbench_plugins.depth.views import FEWEST_VIEWS, DepthViews
 from hecbench_plugins.start_search import by_photographs
 from hecbench_plugins.start_search.view_sphere import ViewSphere, best_apart
-from hecbench_plugins.views.canvas import Canvas
-from hecbench_plugins.views.spool import Spool
 
 _APART = 0.08
 """Below which two draws are alike: rotation, rad, and shift over the distance."""
 
 
-def around(
-    views: DepthViews, start: Array, settings: DepthSettings, rng: np.random.Generator
-) -> Iterator[Array]:
+def around(views: DepthViews, start: Array, rng: np.random.Generator) -> Iterator[Array]:
     """The best camera_T_parent of draws around a start parent_T_camera, by the mean offset of depth."""
+    settings = views.settings
     ball, level, chosen = settings.around, settings.search_level, views.spread(settings.search_views)
     poses = se3.inverse(ball.pose(start, ball.draw(rng, settings.draws)))
-    fits = [
-        views.agreement(pose, chosen, level, settings.noise_per_m, settings.agreeing_m, settings.beyond_m)
-        for pose in poses
-    ]
+    fits = [views.agreement(pose, chosen, level, settings.noise_per_m) for pose in poses]
     least = settings.least_pixels / level**2
     scores = [-fit.cost_m if fit.pixels >= least else -np.inf for fit in fits]
     for index in best_apart(list(poses), scores, settings.followed, _APART):
@@ -37,24 +30,14 @@ def around(
             yield poses[index]
 
 
-def on_a_sphere(views: DepthViews, settings: DepthSettings) -> Iterator[Array]:
+def on_a_sphere(views: DepthViews) -> Iterator[Array]:
     """camera_T_parent of a fixed camera anywhere, by where depth came nearer than the background."""
     if len(views) < FEWEST_VIEWS:
         return
-    moved = views.moved(settings.moved_m, settings.noise_per_m)
-    blank = np.zeros((*views.valid.shape, 3), np.uint8)
-    canvas = Canvas(
-        views.K,
-        Spool.of(lambda _: blank, len(views)),
-        views.valid,
-        np.zeros((len(views), 1)),
-        views.parent_T_link,
-        None,
-        views.sample_ids,
-    )
-    sphere = ViewSphere(spacing_deg=settings.sphere_deg)
-    mesh = views.meshes[max(views.meshes)]
-    for pose in by_photographs.starts(mesh, canvas, moved, sphere, settings.sphere_starts):
+    moved, settings = views.moved(1), views.settings
+    sphere, coarsest = ViewSphere(spacing_deg=settings.sphere_deg), views.meshes[max(views.meshes)]
+    seen = views.K, views.valid, views.parent_T_link, moved
+    for pose in by_photographs.starts(coarsest, *seen, sphere, settings.sphere_starts):
         yield _at_measured_distance(views, pose, moved)
 
 

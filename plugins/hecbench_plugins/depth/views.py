@@ -16,8 +16,9 @@ from hecbench.robots.posed import PosedRobot
 from hecbench.se3 import Array
 from hecbench.system import threads
 from hecbench_plugins.depth import kernels
+from hecbench_plugins.depth.settings import DepthSettings, Stage
 from hecbench_plugins.views.canvas import Rectification
-from hecbench_plugins.views.pyramid import meshes_by_level, photographed_robot
+from hecbench_plugins.views.pyramid import mesh_at, meshes_by_level, photographed_robot
 
 Depth = NDArray[np.float32]
 Result = TypeVar("Result")
@@ -49,7 +50,7 @@ class DepthViews:
         depths: N of (H, W) m, 0 where unknown.
         valid: (H, W) where the canvas lies inside the pictures.
         parent_T_link: (N, L, 4, 4) m.
-        sample_ids: N names.
+        settings: the numbers.
         notes: what was left out.
         renders: pictures drawn so far.
     """
@@ -60,13 +61,13 @@ class DepthViews:
     depths: list[Depth]
     valid: NDArray[np.bool_]
     parent_T_link: Array
-    sample_ids: tuple[str, ...]
+    settings: DepthSettings
     notes: tuple[str, ...] = ()
     renders: int = 0
     _renderers: dict[int, list[Renderer]] = field(default_factory=dict)
 
     @staticmethod
-    def of(recording: Recording) -> DepthViews:
+    def of(recording: Recording, settings: DepthSettings) -> DepthViews:
         """Read and undistort them; a depth picture that cannot be read costs its sample.
 
         Raises:
@@ -105,7 +106,7 @@ class DepthViews:
             depths,
             lens.valid,
             robot.link_poses(robot.joints_rad[rows]),
-            tuple(recording.sample_ids[row] for row in rows),
+            settings,
             tuple(notes),
         )
 
@@ -116,7 +117,7 @@ class DepthViews:
         """Indices of so many views, evenly spread."""
         return sorted({round(place) for place in np.linspace(0, len(self) - 1, count)})
 
-    def moved(self, moved_m: float, noise: float, level: int = 1) -> NDArray[np.float32]:
+    def moved(self, level: int) -> NDArray[np.float32]:
         """(N, H, W) 1 where something is nearer than the background that a fixed camera sees, 0 elsewhere."""
         depths = np.stack([depth[::level, ::level] for depth in self.depths])
         known = (depths > 0).sum(0)
@@ -124,7 +125,7 @@ class DepthViews:
         place = np.floor(_BACKGROUND * np.maximum(known - 1, 0)).astype(int)
         background = np.take_along_axis(ordered, place[None], axis=0)[0]
         background[known == 0] = 0.0
-        limit = background - np.maximum(moved_m, 5 * noise * background**2)
+        limit = background - np.maximum(self.settings.moved_m, 5 * self.settings.noise_per_m * background**2)
         return np.asarray((depths > 0) & (depths < limit), np.float32)
 
     def explained(self, camera_T_parent: Array, moved: NDArray[np.float32], level: int) -> float:
@@ -138,14 +139,15 @@ class DepthViews:
         return float(on_robot / every) if every else 1.0
 
     def normal_equations(
-        self, camera_T_parent: Array, level: int, limit_m: float, noise: float, floor_m: float, grazing: float
-    ) -> tuple[Array, Array, float, int]:
-        """A (6, 6), b (6,), the weighted squares and the pixels used, of all views at one size."""
-        intrinsics = self._intrinsics(level)
-        mesh = self.meshes[min(level, max(self.meshes))]
+        self, camera_T_parent: Array, stage: Stage, noise: float
+    ) -> tuple[Array, Array, int]:
+        """A (6, 6), b (6,) and the pixels used, of all views at one size."""
+        level, settings = stage.level, self.settings
+        intrinsics = np.array([self.K[0, 0], self.K[1, 1], self.K[0, 2], self.K[1, 2]]) / level
+        mesh = mesh_at(self.meshes, level)
         face_link = mesh.part_link[mesh.face_part]
 
-        def one(view: int, renderer: Renderer) -> tuple[Array, Array, float, int]:
+        def one(view: int, renderer: Renderer) -> tuple[Array, Array, int]:
             A, b = np.zeros((6, 6)), np.zeros(6)
             camera_T_link = camera_T_parent @ self.parent_T_link[view]
             drawn = kernels.Drawn(
@@ -156,24 +158,17 @@ class DepthViews:
                 face_link,
                 np.ascontiguousarray(camera_T_link[:, :3, :3], np.float32),
             )
-            squares, _, count = kernels.add_pixels(
-                drawn, self._depth(view, level), intrinsics, limit_m, noise, floor_m, grazing, A, b
+            depth, limits = (
+                self._depth(view, level),
+                (stage.limit_m, noise, settings.floor_m, settings.grazing),
             )
-            return A, b, squares, count
+            return A, b, kernels.add_pixels(drawn, depth, intrinsics, *limits, A, b)
 
         found = self._each(range(len(self)), camera_T_parent, level, one)
-        A, b, squares, counts = (np.array(column) for column in zip(*found, strict=True))
-        return A.sum(0), b.sum(0), float(squares.sum()), int(counts.sum())
+        A, b, counts = (np.array(column) for column in zip(*found, strict=True))
+        return A.sum(0), b.sum(0), int(counts.sum())
 
-    def agreement(
-        self,
-        camera_T_parent: Array,
-        views: Iterable[int],
-        level: int,
-        noise: float,
-        agreeing_m: float,
-        beyond_m: float,
-    ) -> Agreement:
+    def agreement(self, camera_T_parent: Array, views: Iterable[int], level: int, noise: float) -> Agreement:
         """How the drawn robot fits the depth of some views."""
 
         def one(view: int, renderer: Renderer) -> tuple[Array, float]:
@@ -184,8 +179,8 @@ class DepthViews:
                 renderer.box,
                 self._depth(view, level),
                 noise,
-                agreeing_m,
-                beyond_m,
+                self.settings.agreeing_m,
+                self.settings.beyond_m,
                 counts,
             )
             return counts, cost
@@ -198,14 +193,13 @@ class DepthViews:
 
     def noise(self, camera_T_parent: Array, limit_m: float) -> float:
         """The noise of depth over the square of the distance, 1/m, by the median offset from the drawn robot."""
-        room = np.zeros(int(self.valid.sum()), np.float32)
 
         def one(view: int, renderer: Renderer) -> float:
-            own = room if threads.count() == 1 else np.empty_like(room)
-            count = kernels.relative_offsets(
-                renderer.face, renderer.nearness, renderer.box, self._depth(view, 2), limit_m, own
-            )
-            return float(np.median(own[:count])) if count else np.nan
+            depth = self._depth(view, 2)
+            found = np.empty(depth.size, np.float32)
+            drawn = renderer.face, renderer.nearness, renderer.box
+            count = kernels.relative_offsets(*drawn, depth, limit_m, found)
+            return float(np.median(found[:count])) if count else np.nan
 
         offsets = self._each(range(len(self)), camera_T_parent, 2, one)
         return float(1.4826 * np.nanmedian(offsets)) if np.isfinite(offsets).any() else np.nan
@@ -237,13 +231,10 @@ class DepthViews:
             height, width = self._depth(0, level).shape
             K = self.K.copy()
             K[:2] /= level
-            mesh = self.meshes[min(level, max(self.meshes))]
+            mesh = mesh_at(self.meshes, level)
             count = min(threads.count(), len(self))
             self._renderers[level] = [Renderer(mesh, K, width, height) for _ in range(count)]
         return self._renderers[level]
 
     def _depth(self, view: int, level: int) -> Depth:
         return self.depths[view][::level, ::level]
-
-    def _intrinsics(self, level: int) -> Array:
-        return np.array([self.K[0, 0], self.K[1, 1], self.K[0, 2], self.K[1, 2]]) / level

@@ -12,6 +12,7 @@ from hecbench.errors import InputError, TargetNotSeen
 from hecbench.se3 import Array
 from hecbench.system import apriltags
 from hecbench.targets import ANY_TAG, AprilTagTarget
+from hecbench_plugins.detection.edges import apart
 from hecbench_plugins.detection.pictures import each, mirrored
 
 Grey = NDArray[np.uint8]
@@ -44,15 +45,9 @@ def sightings(grey: Grey, family: str) -> dict[int, list[Array]]:
     by_id: dict[int, list[Array]] = {}
     for tag in sorted(found, key=lambda tag: -tag.margin):
         others = by_id.setdefault(tag.id, [])
-        if all(_apart(tag.corners_px, other) for other in others):
+        if all(apart(tag.corners_px, other) for other in others):
             others.append(tag.corners_px)
     return by_id
-
-
-def _apart(corners_px: Array, other: Array) -> bool:
-    """Whether two quadrilaterals are not the same tag, found twice."""
-    width = np.linalg.norm(other[1] - other[0])
-    return bool(np.linalg.norm(corners_px.mean(0) - other.mean(0)) > width / 2)
 
 
 def find(greys: Sequence[Grey | None], target: AprilTagTarget) -> tuple[AprilTagTarget, list[Array | None]]:

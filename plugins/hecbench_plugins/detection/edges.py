@@ -25,6 +25,12 @@ _LEAST_CONTRAST = 8.0
 """Grey levels between the two sides."""
 
 
+def apart(corners_px: Array, other: Array) -> bool:
+    """Whether two quadrilaterals (4, 2) px are not the same square, found twice."""
+    width = np.linalg.norm(other[1] - other[0])
+    return bool(np.linalg.norm(corners_px.mean(0) - other.mean(0)) > width / 2)
+
+
 def refined(grey: NDArray[np.uint8], corners_px: Array, cells: int) -> Array | None:
     """Corners (4, 2) px, clockwise in the picture, of a black square of `cells` cells a side; None without edges."""
     found = corners_px

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +18,7 @@ from hecbench.errors import TargetNotSeen
 from hecbench.se3 import Array
 from hecbench.targets import AprilGridTarget, ArucoGridTarget, ArucoTarget, MarkersTarget
 from hecbench_plugins.detection.dictionaries import named, shown_in
-from hecbench_plugins.detection.edges import refined
+from hecbench_plugins.detection.edges import apart, refined
 from hecbench_plugins.detection.pictures import each, mirrored
 
 Grey = NDArray[np.uint8]
@@ -97,14 +96,9 @@ def markers(grey: Grey, dictionary: str, border: int) -> dict[int, Array]:
         for number, quad in zip([] if ids is None else np.ravel(ids).tolist(), quads, strict=True):
             corners = refined(grey, np.asarray(quad[0], float), cells)
             others = by_id.setdefault(int(number), [])
-            if corners is not None and all(_apart(corners, other) for other in others):
+            if corners is not None and all(apart(corners, other) for other in others):
                 others.append(corners)
     return {number: found[0] for number, found in by_id.items() if len(found) == 1}
-
-
-def _apart(corners: Array, other: Array) -> bool:
-    """Whether two quadrilaterals are not the same marker, found twice."""
-    return bool(np.linalg.norm(corners.mean(0) - other.mean(0)) > _side(other) / 2)
 
 
 def _side(corners: Array) -> float:
@@ -129,10 +123,8 @@ def _placed(found: dict[int, Array], layout: Layout) -> dict[int, Array]:
     import cv2
 
     ours = {number: corners for number, corners in found.items() if number in _range(layout.target)}
-    if len(ours) < 2 and layout.target.marker_count > 1:
-        return {}
     if len(ours) < 2:
-        return ours
+        return ours if layout.target.marker_count == 1 else {}
     plane = np.concatenate([_points(layout, number) for number in ours])
     pixels = np.concatenate([_listed(corners, layout) for corners in ours.values()])
     limits = {number: _PLACED * _side(corners) for number, corners in ours.items()}
@@ -172,7 +164,7 @@ def _other_layout(seen: Sightings, ids: list[int], target: MarkersTarget) -> str
         rows = -(-(ids[-1] - ids[0] + 1) // columns)
         other = replace(target, columns=columns, rows=rows, first_id=ids[0])
         for turn in range(4):
-            placed: list[dict[int, Any]] = [_placed(found, Layout(other, turn)) for found in seen]
+            placed = [_placed(found, Layout(other, turn)) for found in seen]
             if sum(map(len, placed)) >= _WELL_PLACED * sum(map(len, seen)):
                 return (
                     f"{shown}, as a grid of {columns} columns, not {target.columns}: count columns and rows"

@@ -39,9 +39,7 @@ def covariance(camera_T_parent: Array, last: ContourEquations, prior: Array) -> 
     freedom = 6.0 * (len(scores) - 1)
     factor = (_PRIOR_FREEDOM * CORRELATED_POINTS + sum(scores)) / (_PRIOR_FREEDOM + freedom)
     seen_from_camera = np.linalg.inv(last.A / factor + np.diag(prior))[:6, :6]
-    carried = se3.adjoint(se3.inverse(camera_T_parent))
-    found = carried @ seen_from_camera @ carried.T
-    return np.asarray((found + found.T) / 2)
+    return se3.inverse_covariance(camera_T_parent, seen_from_camera)
 
 
 def answer(

@@ -32,7 +32,7 @@ from hecbench_plugins.start_search.by_photographs import starts
 from hecbench_plugins.start_search.view_sphere import ViewSphere
 from hecbench_plugins.views import scene_background
 from hecbench_plugins.views.canvas import Canvas, undistorted_canvas
-from hecbench_plugins.views.pyramid import meshes_by_level, photographed_robot
+from hecbench_plugins.views.pyramid import mesh_at, meshes_by_level, photographed_robot
 
 NEAR, FAR = Ball(0.1, np.deg2rad(10)), Ball(0.2, np.deg2rad(20))
 """How far off a start may be."""
@@ -112,7 +112,7 @@ class Photographs:
     def lines(self, step: RefinementLevel, canvas: Canvas) -> ContourMatcher:
         """The views of a canvas at the size of a step."""
         background = self.background if step.background else None
-        return ContourMatcher(self.meshes[min(step.level, max(self.meshes))], canvas, step.level, background)
+        return ContourMatcher(mesh_at(self.meshes, step.level), canvas, step.level, background)
 
     def refined(self, camera_T_parent: Array) -> Refined:
         """All steps but the last from a pose of the search, on the searched views."""
@@ -200,7 +200,8 @@ class Maskless:
         """Where to search, in this order."""
         if self.free is not None and foreground is not None:
             mesh = photographs.meshes[SEARCH_LEVEL]
-            found = starts(mesh, photographs.search_views, foreground, self.free, _FREE_STARTS)
+            seen = photographs.search_views
+            found = starts(mesh, seen.K, seen.valid, seen.parent_T_link, foreground, self.free, _FREE_STARTS)
             return [SearchRegion(se3.inverse(pose), _FREE_BALL, 1) for pose in found]
         assert start is not None
         balls = (FAR,) if len(photographs.canvas) >= _FEWEST_FOR_FAR else (NEAR, FAR)

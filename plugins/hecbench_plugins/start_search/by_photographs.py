@@ -17,7 +17,6 @@ from hecbench.se3 import Array
 from hecbench.system import threads
 from hecbench_plugins.start_search.kernels import coverage
 from hecbench_plugins.start_search.view_sphere import ViewSphere, best_apart, look_at
-from hecbench_plugins.views.canvas import Canvas
 
 _DISTANCES = (1.2, 1.6, 2.1, 2.8, 3.7, 4.9)
 """Of the camera, in spans of the moving links."""
@@ -33,7 +32,9 @@ _APART = 0.2
 
 def starts(
     mesh: RenderMesh,
-    canvas: Canvas,
+    K: Array,
+    valid: NDArray[np.bool_],
+    parent_T_link: Array,
     foreground: NDArray[np.float32],
     sphere: ViewSphere,
     count: int,
@@ -42,64 +43,73 @@ def starts(
 
     Args:
         mesh: of the robot, coarse.
-        canvas: of a fixed camera; the z of its parent frame points up.
+        K: (3, 3) px of the fixed camera.
+        valid: (H, W) where its pictures say something.
+        parent_T_link: (N, L, 4, 4) m; the z of the parent frame points up.
         foreground: (N, H, W) how unlike the background each pixel is.
         sphere: directions and rolls to try.
         count: how many to return.
     """
-    middle, span = _moving(canvas)
+    middle, span = _moving(parent_T_link)
     centre = np.array([0.0, 0.0, 1.0])
     rotations = sphere.rotations()
     poses = np.concatenate([look_at(rotations, middle, centre, factor * span) for factor in _DISTANCES])
-    _, costs = _shifted(mesh, canvas, foreground, poses, _COARSE_PX)
+    views = np.unique(np.linspace(0, len(parent_T_link) - 1, _VIEWS).round().astype(int))
+    seen = K, valid, parent_T_link[views], foreground[views]
+    _, costs = _shifted(mesh, seen, poses, _COARSE_PX)
     better = np.sort(costs.argsort(kind="stable")[: max(count, round(_BETTER * len(poses)))])
-    found, costs = _shifted(mesh, canvas, foreground, poses[better], _WIDTH_PX)
+    found, costs = _shifted(mesh, seen, poses[better], _WIDTH_PX)
     return [found[i] for i in best_apart(list(found), list(-costs), count, _APART)]
 
 
 def _shifted(
     mesh: RenderMesh,
-    canvas: Canvas,
-    foreground: NDArray[np.float32],
+    seen: tuple[Array, NDArray[np.bool_], Array, NDArray[np.float32]],
     poses: Array,
     width: int,
 ) -> tuple[Array, Array]:
     """The poses (n, 4, 4), each turned to where the photographs changed, and the costs (n,) of that."""
-    views = np.unique(np.linspace(0, len(canvas) - 1, _VIEWS).round().astype(int))
-    shown = canvas.subset(views)
-    shifts = [_Shifts(mesh, shown, foreground[views], width) for _ in range(threads.count())]
+    shifts = [_Shifts(mesh, *seen, width) for _ in range(threads.count())]
     pairs = zip(shifts, np.array_split(poses, len(shifts)), strict=True)
     shares = threads.each(lambda pair: [pair[0](pose) for pose in pair[1]], pairs)
     rays, costs = zip(*(row for share in shares for row in share), strict=True)
     return _turn_to(np.array(rays)) @ poses, np.array(costs)
 
 
-def _moving(canvas: Canvas) -> tuple[Array, float]:
+def _moving(parent_T_link: Array) -> tuple[Array, float]:
     """The middle (3,) m of the links' origins in the parent's frame, and their largest extent, m."""
-    points = canvas.parent_T_link[..., :3, 3].reshape(-1, 3)
+    points = parent_T_link[..., :3, 3].reshape(-1, 3)
     return points.mean(0), float(np.ptp(points, axis=0).max())
 
 
 class _Shifts:
     """For a pose that looks at the robot, the turn of the camera that puts it where the photographs changed."""
 
-    def __init__(self, mesh: RenderMesh, canvas: Canvas, foreground: NDArray[np.float32], width: int) -> None:
+    def __init__(
+        self,
+        mesh: RenderMesh,
+        K: Array,
+        valid: NDArray[np.bool_],
+        parent_T_link: Array,
+        foreground: NDArray[np.float32],
+        width: int,
+    ) -> None:
         import cv2
 
-        self._canvas = canvas
-        height = round(width * canvas.valid.shape[0] / canvas.valid.shape[1])
-        self._K = shrunk_intrinsics(canvas.K, width / canvas.valid.shape[1], height / canvas.valid.shape[0])
+        self._parent_T_link = parent_T_link
+        height = round(width * valid.shape[0] / valid.shape[1])
+        self._K = shrunk_intrinsics(K, width / valid.shape[1], height / valid.shape[0])
         self._size = (2 * height, 2 * width)
         self._middle = np.array([width - 0.5, height - 0.5])
         drawn_K = self._K.copy()
         drawn_K[:2, 2] = self._middle
         self._renderer = Renderer(mesh, drawn_K, 2 * width, 2 * height)
-        gain = np.zeros((len(canvas), *self._size), np.float32)
+        gain = np.zeros((len(parent_T_link), *self._size), np.float32)
         for view, changed in enumerate(foreground):
             small = cv2.resize(changed, (width, height), interpolation=cv2.INTER_AREA)
             gain[view, :height, :width] = _UNCHANGED_COST * (1 - small) - small
-        valid = cv2.resize(canvas.valid.astype(np.float32), (width, height), interpolation=cv2.INTER_AREA)
-        gain[:, :height, :width] *= valid > 0.9
+        inside = cv2.resize(valid.astype(np.float32), (width, height), interpolation=cv2.INTER_AREA)
+        gain[:, :height, :width] *= inside > 0.9
         self._gain = np.fft.rfft2(gain)
         self._covered = np.zeros_like(gain)
         self._ray_of = np.linalg.inv(self._K)
@@ -107,7 +117,7 @@ class _Shifts:
     def __call__(self, camera_T_parent: Array) -> tuple[Array, float]:
         """The ray (x, y, 1) to turn the optical axis to, and its cost; the cost of a robot that is nowhere is 0."""
         renderer = self._renderer
-        coverage(renderer.scene, renderer.sight, camera_T_parent, self._canvas.parent_T_link, self._covered)
+        coverage(renderer.scene, renderer.sight, camera_T_parent, self._parent_T_link, self._covered)
         spectrum = (np.fft.rfft2(self._covered).conj() * self._gain).sum(0)
         costs = np.fft.irfft2(spectrum, self._size)
         best = np.unravel_index(costs.argmin(), self._size)

@@ -44,6 +44,11 @@ def meshes_by_level(model: RobotModel) -> dict[int, RenderMesh]:
     return {level: RenderMesh.cached(model, cell_m=cell_m) for level, cell_m in _COARSE_CELL_M.items()}
 
 
+def mesh_at(meshes: dict[int, RenderMesh], level: int) -> RenderMesh:
+    """The mesh for pictures of a level, the coarsest there is for still smaller ones."""
+    return meshes[min(level, max(meshes))]
+
+
 @dataclass(frozen=True, eq=False)
 class Level:
     """One view at one size."""

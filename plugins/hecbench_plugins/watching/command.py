@@ -65,11 +65,11 @@ def watch(
     RECORDING names robot, camera and mounting; its pictures are the frames, in their order, unless --camera and
     --robot give live ones. Exits with 3 at an alarm, with 1 when the robot was never seen.
     """
-    from hecbench_plugins.watching.settings import WatchSettings
-    from hecbench_plugins.watching.watch import Verdict, Watch
-
     from hecbench import estimate as estimates
     from hecbench import preparation
+    from hecbench_plugins.watching.settings import WatchSettings
+    from hecbench_plugins.watching.state import Verdict
+    from hecbench_plugins.watching.watch import Watch
 
     if (camera is None) != (robot is None):
         raise InputError("live frames need both --camera and --robot")

@@ -11,90 +11,38 @@ systems"). A hidden robot confirms less of its contour: then nothing is conclude
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from enum import StrEnum
 from typing import Any
 
 import numpy as np
-from hecbench_plugins.maskless.align import ContourEquations, ContourMatcher, RefinementLevel, refine
-from hecbench_plugins.views.canvas import Canvas, Rectification
-from hecbench_plugins.views.pyramid import meshes_by_level
-from hecbench_plugins.views.spool import Spool
-from hecbench_plugins.watching.settings import WatchSettings
 from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.estimate import Estimate
-from hecbench.recording import Recording
+from hecbench.recording import Mounting, Recording
 from hecbench.robots.posed import PosedRobot
 from hecbench.se3 import Array
 from hecbench.workspace import apart_m, points_in_parent
+from hecbench_plugins.maskless.align import ContourEquations, ContourMatcher, RefinementLevel, refine
+from hecbench_plugins.views.canvas import Canvas, Rectification
+from hecbench_plugins.views.pyramid import mesh_at, meshes_by_level
+from hecbench_plugins.views.spool import Spool
+from hecbench_plugins.watching.equations import Reference, concluded, offset
+from hecbench_plugins.watching.settings import WatchSettings
+from hecbench_plugins.watching.state import Verdict, WatchState
 
 _SPACING_PX = 1.0
 """Between samples across the contour: at full size one pixel."""
 _AROUND = tuple(RefinementLevel(level, 2.0, 6, False) for level in (8, 4, 2, 1))
 """Where the robot is looked for when it is not where it should be: some 100 px around, coarse to fine."""
-
-
-class Verdict(StrEnum):
-    """What a frame leads to."""
-
-    LEARNING = "learning"
-    TRUE = "true"
-    CANNOT_SEE = "cannot_see"
-    MOVED = "moved"
-
-
-@dataclass(frozen=True, eq=False)
-class WatchState:
-    """The state after a frame.
-
-    Attributes:
-        verdict: what it leads to.
-        frame: how many there were before.
-        confirmed: share of the robot's contour that this frame confirms.
-        score: mean square of the six standardised offsets of the window; None while nothing is concluded.
-        offset_mm: rms displacement of the workspace against the estimate; None while nothing is concluded.
-        parent_T_camera: (4, 4) m, the camera by the window's frames; the estimate's before there are any.
-        covariance: (6, 6) of it, as an estimate's, or None.
-        reason: of an alarm or of not seeing, a sentence; else None.
-    """
-
-    verdict: Verdict
-    frame: int
-    confirmed: float
-    score: float | None
-    offset_mm: float | None
-    parent_T_camera: Array
-    covariance: Array | None
-    reason: str | None = None
-
-    def to_json(self) -> dict[str, Any]:
-        """Plain values."""
-        return {
-            "frame": self.frame,
-            "verdict": str(self.verdict),
-            "confirmed": round(self.confirmed, 3),
-            "score": None if self.score is None else round(self.score, 2),
-            "offset_mm": None if self.offset_mm is None else round(self.offset_mm, 2),
-            "parent_T_camera": self.parent_T_camera.tolist(),
-            "covariance": None if self.covariance is None else self.covariance.tolist(),
-            "reason": self.reason,
-        }
-
-
-@dataclass(frozen=True, eq=False)
-class _Reference:
-    """What the first frames say: the pose about which all is linearised, and what they left open."""
-
-    camera_T_parent: Array
-    offsets_rad: Array
-    joint_information: Array
-    covariance: Array
-    confirmed: float
-    noise: float
+_ELSEWHERE_MM = 2.0
+"""From the reference: nearer, a contour that is not confirmed is hidden."""
+_HIDDEN = (
+    "too little of the robot's contour is seen: it is hidden, out of the picture, or its joints are not those"
+)
+_TRACKED = "+watch"
 
 
 @dataclass(eq=False)
@@ -102,7 +50,7 @@ class Watch:
     """Tell it every frame: ``state = watch.update(image, joints_rad)``.
 
     Attributes:
-        recording: names robot, camera and mounting; its samples do not matter. See `Watch.of`.
+        recording: names robot, camera and mounting; its samples do not matter.
         estimate: the calibration that is watched.
         settings: when it gives alarm.
         track: follow the camera after an alarm, with the pose found as the new reference.
@@ -133,7 +81,7 @@ class Watch:
             self.recording.base_T_flange
             if self.recording.base_T_flange is not None
             else self._robot.base_T_flange,
-            camera_moves=self.recording.mounting == "eye_in_hand",
+            camera_moves=self.recording.mounting is Mounting.EYE_IN_HAND,
         )
         self._pose = se3.inverse(self.estimate.pose)
         self._offsets = _joint_offsets(self.estimate.extras, self._robot.joint_names)
@@ -143,7 +91,7 @@ class Watch:
 
     def _start_over(self) -> None:
         self._learned: list[ContourEquations] = []
-        self._reference: _Reference | None = None
+        self._reference: Reference | None = None
         self._window: deque[ContourEquations] = deque(maxlen=self.settings.window_frames)
         self._in_a_row = 0
 
@@ -162,12 +110,16 @@ class Watch:
                 f"frame {self._frame}: joints {joints.tolist()}, expected {len(self._robot.joint_names)} finite numbers"
             )
         shown = self._lens.image(image)
-        found = self._compared(shown, joints)
+        matcher = self._showing(shown, joints)
+        known = matcher.colours()
+        twists = self._robot.twists(joints + self._offsets) @ se3.adjoint(self._pose).T
+        found = matcher(self._pose, _SPACING_PX, twists=[twists])
         if self._reference is None:
             state = self._learn(found)
         elif self._is_seen(found, self._reference):
             state = self._test(found, self._reference)
         else:
+            matcher.recall(known)
             state = self._look_around(shown, joints, found, self._reference)
         self._frame += 1
         return state
@@ -178,22 +130,16 @@ class Watch:
             self._lens.K, view, self._lens.valid, joints[None], parent_T_link[None], None, ("frame",)
         )
 
-    def _compared(self, shown: NDArray[np.uint8], joints_rad: Array) -> ContourEquations:
-        """The contour about the reference, with a column for every joint."""
+    def _showing(self, shown: NDArray[np.uint8], joints_rad: Array) -> ContourMatcher:
+        """The matcher at full size, looking at this frame."""
         joints = joints_rad + self._offsets
         parent_T_link = self._robot.clipped_link_poses(joints)
         if self._matcher is None:
-            self._matcher = ContourMatcher(
-                self._meshes[1], self._canvas(shown, joints, parent_T_link), 1, None
-            )
+            canvas = self._canvas(shown, joints, parent_T_link)
+            self._matcher = ContourMatcher(self._meshes[1], canvas, 1, None)
             self._matcher.learn(self._pose, _SPACING_PX)
-        known = self._matcher.colours()
         self._matcher.show(shown, parent_T_link)
-        twists = self._robot.twists(joints) @ se3.adjoint(self._pose).T
-        found = self._matcher(self._pose, _SPACING_PX, twists=[twists])
-        if self._reference is not None and not self._is_seen(found, self._reference):
-            self._matcher.recall(known)
-        return found
+        return self._matcher
 
     def _learn(self, found: ContourEquations) -> WatchState:
         if found.points >= self.settings.least_points:
@@ -202,7 +148,7 @@ class Watch:
             reason = None if found.points >= self.settings.least_points else _HIDDEN
             verdict = Verdict.LEARNING if reason is None else Verdict.CANNOT_SEE
             return self._state(verdict, found, reason=reason)
-        self._reference = reference = self._concluded()
+        self._reference = reference = concluded(self._learned, self._pose, self._offsets, self.settings)
         self._pose, self._offsets = reference.camera_T_parent, reference.offsets_rad
         if self.estimate.solver.endswith(_TRACKED):
             self.estimate = self._tracked(reference.camera_T_parent, reference.covariance)
@@ -212,45 +158,19 @@ class Watch:
             return self._moved(found, None, reference.camera_T_parent, reference.covariance, reason)
         return self._state(Verdict.TRUE, found, 0.0, off_mm, reference.camera_T_parent, reference.covariance)
 
-    def _concluded(self) -> _Reference:
-        """The least squares of the first frames over the camera and the joints' offsets."""
-        settings, joints = self.settings, len(self._offsets)
-        A, b = _added(self._learned)
-        prior = np.r_[
-            np.full(6, 1e-9), np.full(joints, settings.correlated_points / settings.joint_sigma_rad**2)
-        ]
-        information = A + np.diag(prior)
-        move = np.linalg.solve(information, b)
-        freedom = [
-            (f.b - f.A @ move)[:6] @ np.linalg.solve(f.A[:6, :6], (f.b - f.A @ move)[:6])
-            for f in self._learned
-        ]
-        noise = max(1.0, float(np.median(freedom)) / (6 * settings.correlated_points))
-        covariance = settings.correlated_points * noise * np.linalg.inv(information)
-        return _Reference(
-            se3.exp(move[:6]) @ self._pose,
-            self._offsets + move[6:],
-            np.asarray(np.linalg.inv(covariance[6:, 6:]), float),
-            covariance[:6, :6],
-            float(np.median([f.confirmed_share for f in self._learned])),
-            noise,
-        )
-
-    def _is_seen(self, found: ContourEquations, reference: _Reference) -> bool:
+    def _is_seen(self, found: ContourEquations, reference: Reference) -> bool:
         settings = self.settings
         enough = found.points >= settings.least_points
         return enough and found.confirmed_share >= settings.least_confirmed * reference.confirmed
 
     def _look_around(
-        self, shown: NDArray[np.uint8], joints_rad: Array, found: ContourEquations, reference: _Reference
+        self, shown: NDArray[np.uint8], joints_rad: Array, found: ContourEquations, reference: Reference
     ) -> WatchState:
         """The robot is hidden, or the camera has moved far: is its contour elsewhere in the picture?"""
         joints, pose = joints_rad + self._offsets, reference.camera_T_parent
         canvas = self._canvas(shown, joints, self._robot.clipped_link_poses(joints))
         for level in _AROUND:
-            matcher = ContourMatcher(
-                self._meshes[min(level.level, max(self._meshes))], canvas, level.level, None
-            )
+            matcher = ContourMatcher(mesh_at(self._meshes, level.level), canvas, level.level, None)
             there = refine(matcher, pose, level)
             pose = there.camera_T_parent
         self._window.clear()
@@ -268,41 +188,28 @@ class Watch:
             )
         return self._moved(there.last, None, pose, covariance, self._displaced(pose, reference))
 
-    def _displaced(self, pose: Array, reference: _Reference) -> str:
+    def _displaced(self, pose: Array, reference: Reference) -> str:
         return (
             f"the workspace is {self._off_mm(pose):.1f} mm from where the estimate has it and"
             f" {self._off_mm(pose, reference.camera_T_parent):.1f} mm from where the first frames had it:"
             " calibrate again"
         )
 
-    def _test(self, found: ContourEquations, reference: _Reference) -> WatchState:
+    def _test(self, found: ContourEquations, reference: Reference) -> WatchState:
         settings = self.settings
         self._window.append(found)
-        offset, covariance = self._offset(reference)
+        moved, covariance = offset(self._window, reference, settings)
         still = np.r_[np.full(3, settings.still_turn_rad), np.full(3, settings.still_shift_m)] ** 2
-        score = (
-            float(offset @ np.linalg.solve(covariance + reference.covariance + np.diag(still), offset)) / 6
-        )
-        pose = se3.exp(offset) @ reference.camera_T_parent
+        score = float(moved @ np.linalg.solve(covariance + reference.covariance + np.diag(still), moved)) / 6
+        pose = se3.exp(moved) @ reference.camera_T_parent
         off_mm = self._off_mm(pose)
         full = len(self._window) == settings.window_frames
-        jumped, gone = (
-            score > settings.alarm,
-            full and off_mm > settings.limit_mm + self._sigma_mm(covariance),
-        )
-        self._in_a_row = self._in_a_row + 1 if jumped or gone else 0
+        sigma_mm = 1e3 * float(np.sqrt(np.trace(covariance[3:, 3:])))
+        gone = full and off_mm > settings.limit_mm + sigma_mm
+        self._in_a_row = self._in_a_row + 1 if gone or score > settings.alarm else 0
         if self._in_a_row >= settings.alarm_frames:
             return self._moved(found, score, pose, covariance, self._displaced(pose, reference))
         return self._state(Verdict.TRUE, found, score, off_mm, pose, covariance)
-
-    def _offset(self, reference: _Reference) -> tuple[Array, Array]:
-        """The camera's offset (6,) by the window's frames, and its covariance, the joints eliminated."""
-        scale = self.settings.correlated_points * reference.noise
-        A, b = (part / scale for part in _added(self._window))
-        gain = np.linalg.solve(A[6:, 6:] + reference.joint_information, np.column_stack([A[6:, :6], b[6:]]))
-        reduced = A[:6, :6] - A[:6, 6:] @ gain[:, :6] + 1e-9 * np.eye(6)
-        covariance = np.linalg.inv(reduced)
-        return covariance @ (b[:6] - A[:6, 6:] @ gain[:, 6]), np.asarray(covariance, float)
 
     def _moved(
         self, found: ContourEquations, score: float | None, pose: Array, covariance: Array, reason: str
@@ -318,7 +225,7 @@ class Watch:
         return replace(
             self.estimate,
             parent_T_camera=se3.inverse(pose),
-            covariance=_carried(covariance, pose),
+            covariance=se3.inverse_covariance(pose, covariance),
             solver=f"{self.estimate.solver.removesuffix(_TRACKED)}{_TRACKED}",
         )
 
@@ -326,9 +233,6 @@ class Watch:
         """Rms displacement of the workspace from another camera_T_parent, by default the estimate's."""
         against = self.estimate.pose if other is None else se3.inverse(other)
         return 1e3 * float(apart_m(se3.inverse(camera_T_parent), against, self._points_m))
-
-    def _sigma_mm(self, covariance: Array) -> float:
-        return 1e3 * float(np.sqrt(np.trace(covariance[3:, 3:])))
 
     def _state(
         self,
@@ -341,29 +245,10 @@ class Watch:
         reason: str | None = None,
     ) -> WatchState:
         here = self._pose if pose is None else pose
-        carried = None if covariance is None else _carried(covariance, here)
+        carried = None if covariance is None else se3.inverse_covariance(here, covariance)
         return WatchState(
             verdict, self._frame, found.confirmed_share, score, offset_mm, se3.inverse(here), carried, reason
         )
-
-
-_ELSEWHERE_MM = 2.0
-"""From the reference: nearer, a contour that is not confirmed is hidden."""
-_HIDDEN = (
-    "too little of the robot's contour is seen: it is hidden, out of the picture, or its joints are not those"
-)
-_TRACKED = "+watch"
-
-
-def _added(frames: Sequence[ContourEquations] | deque[ContourEquations]) -> tuple[Array, Array]:
-    """The normal equations of all frames."""
-    return np.sum([frame.A for frame in frames], 0), np.sum([frame.b for frame in frames], 0)
-
-
-def _carried(covariance: Array, camera_T_parent: Array) -> Array:
-    """The covariance (6, 6) of camera_T_parent's left perturbation as that of parent_T_camera's."""
-    carried = se3.adjoint(se3.inverse(camera_T_parent))
-    return np.asarray(carried @ covariance @ carried.T)
 
 
 def _joint_offsets(extras: Mapping[str, Any], names: tuple[str, ...]) -> Array:

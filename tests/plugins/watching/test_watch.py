@@ -8,7 +8,8 @@ import pytest
 from click.testing import CliRunner
 from hecbench_plugins.watching.command import watch as verb
 from hecbench_plugins.watching.settings import WatchSettings
-from hecbench_plugins.watching.watch import Verdict, Watch
+from hecbench_plugins.watching.state import Verdict
+from hecbench_plugins.watching.watch import Watch
 from scipy import ndimage
 
 from hecbench import se3
