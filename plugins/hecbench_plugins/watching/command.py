@@ -11,17 +11,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 import msgspec
-import numpy as np
-from numpy.typing import NDArray
 
 from hecbench.commands import choices
 from hecbench.errors import InputError
 
 if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
     from hecbench.recording import Recording
     from hecbench.se3 import Array
 
-Frames = Iterator[tuple[NDArray[np.uint8], "Array"]]
+Frames = Iterator[tuple["NDArray[np.uint8]", "Array"]]
 
 
 @click.command()
@@ -101,6 +102,8 @@ def watch(
 
 def _recorded(cell: Recording) -> Frames:
     """The pictures of a recording with their joints; one that cannot be read is named and left out."""
+    import numpy as np
+
     joints = cell.joints_rad
     rows = [i for i, source in enumerate(cell.images or ()) if source is not None]
     if joints is None or not rows:
