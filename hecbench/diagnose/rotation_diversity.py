@@ -14,6 +14,7 @@ from hecbench import se3
 from hecbench.diagnose.calibrate import spread
 from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity
+from hecbench.se3 import Array
 
 ID = "rotation_diversity"
 LEAST_ANGLE_DEG = 10.0
@@ -35,11 +36,7 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
             ID, Severity.CRITICAL, summary, "record 10 or more samples", float(len(rotations)), 3.0
         )
         return finding, replace(case, judged=False)
-    rotations = rotations[spread(len(rotations))]
-    i, j = np.triu_indices(len(rotations), 1)
-    logs = se3.so3_log(np.swapaxes(rotations[i], 1, 2) @ rotations[j])
-    largest = float(np.rad2deg(np.linalg.norm(logs, axis=1).max()))
-    second = float(np.rad2deg(np.linalg.svd(logs, compute_uv=False)[1]) / np.sqrt(len(logs)))
+    largest, second = turns_deg(rotations)
     if largest < LEAST_ANGLE_DEG:
         summary = f"the hand turns by {largest:.2g} deg at most between samples"
         finding = Finding(ID, Severity.CRITICAL, summary, _TILT, largest, LEAST_ANGLE_DEG)
@@ -52,3 +49,14 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
     if second < GOOD_SECOND_AXIS_DEG:
         return Finding(ID, Severity.WARNING, summary, _TILT, second, GOOD_SECOND_AXIS_DEG), case
     return Finding(ID, Severity.OK, summary, value=second, limit=GOOD_SECOND_AXIS_DEG), case
+
+
+def turns_deg(rotations: Array) -> tuple[float, float]:
+    """The largest rotation between two of (N, 3, 3), N > 1, and the rms rotation about the second principal axis."""
+    chosen = rotations[spread(len(rotations))]
+    i, j = np.triu_indices(len(chosen), 1)
+    logs = se3.so3_log(np.swapaxes(chosen[i], 1, 2) @ chosen[j])
+    largest = float(np.rad2deg(np.linalg.norm(logs, axis=1).max()))
+    singular = np.linalg.svd(logs, compute_uv=False)
+    second = float(np.rad2deg(singular[1]) / np.sqrt(len(logs))) if len(singular) > 1 else 0.0
+    return largest, second

@@ -14,6 +14,8 @@ from hecbench import se3
 from hecbench.errors import HecbenchError, InputError
 from hecbench.estimate import Estimate
 from hecbench.recording import Mounting, Recording
+from hecbench.rendering import RenderMesh
+from hecbench.robots.model import RobotModel
 from hecbench.robots.posed import PosedRobot
 from hecbench.running.isolation import stdout_to_stderr
 from hecbench.se3 import Array
@@ -22,6 +24,52 @@ from hecbench.system import files
 _BOLD_RGB, _RIVAL_RGB, _TARGET_RGB = (20, 120, 60), (150, 160, 175), (255, 120, 30)
 _FRUSTUM_M = 0.12
 _WIDEST_PX = 640
+_CELL_M = 0.003
+
+
+class ShownRobot:
+    """The meshes of a robot model in a scene of viser, all in one colour where one is given.
+
+    They are simplified by `cell_m`, so that a browser without a graphics card turns them smoothly.
+    """
+
+    def __init__(
+        self,
+        scene: Any,
+        name: str,
+        model: RobotModel,
+        colour: tuple[int, int, int] | None = None,
+        opacity: float | None = None,
+        cell_m: float = _CELL_M,
+    ) -> None:
+        mesh = RenderMesh.cached(model, cell_m=cell_m)
+        self._meshes: list[tuple[int, Any]] = []
+        for part, link in enumerate(mesh.part_link):
+            used, faces = np.unique(mesh.faces[mesh.face_part == part], return_inverse=True)
+            shown = scene.add_mesh_simple(
+                f"{name}/{part}",
+                mesh.vertices.T[used],
+                faces.reshape(-1, 3),
+                color=colour or tuple(round(255 * value) for value in mesh.colours[part]),
+                opacity=opacity,
+            )
+            self._meshes.append((int(link), shown))
+
+    def place(self, base_T_link: Array) -> None:
+        """Show it with its links at (L, 4, 4) m."""
+        for link, mesh in self._meshes:
+            place(mesh, base_T_link[link])
+            mesh.visible = True
+
+    def fade(self, opacity: float) -> None:
+        """From 0, not to be seen, to 1."""
+        for _, mesh in self._meshes:
+            mesh.opacity = opacity
+
+    def hide(self) -> None:
+        """Show nothing until it is placed again."""
+        for _, mesh in self._meshes:
+            mesh.visible = False
 
 
 @dataclass(eq=False)
@@ -38,7 +86,7 @@ class Stage:
     recording: Recording
     estimates: Sequence[Estimate]
     _links: Array | None = field(default=None, init=False)
-    _meshes: dict[int, list[Any]] = field(default_factory=dict, init=False)
+    _robot: ShownRobot | None = field(default=None, init=False)
     _frusta: list[Any] = field(default_factory=list, init=False)
 
     def __post_init__(self) -> None:
@@ -75,16 +123,7 @@ class Stage:
             self.server.scene.add_frame("/flange", axes_length=0.1, axes_radius=0.003)
             return
         self._links = robot.link_poses(robot.joints_rad)
-        for number, part in enumerate(robot.model.parts):
-            link = robot.model.links.index(part.link)
-            colour = tuple(round(255 * value) for value in part.colour)
-            mesh = self.server.scene.add_mesh_simple(
-                f"/robot/{number}",
-                np.asarray(part.vertices, np.float32),
-                np.asarray(part.faces),
-                color=colour,
-            )
-            self._meshes.setdefault(link, []).append(mesh)
+        self._robot = ShownRobot(self.server.scene, "/robot", robot.model)
 
     def _add_camera(self, number: int, estimate: Estimate) -> None:
         camera = estimate.camera or self.recording.camera
@@ -112,11 +151,8 @@ class Stage:
         self._text = gui.add_markdown(f"**{self.estimates[0].solver}** bold; click a camera for distances")
         if slider is not None:
             slider.on_update(lambda event: self.show(int(self.samples[slider.value])))
-        opacity.on_update(lambda event: self._fade(opacity.value))
-
-    def _fade(self, opacity: float) -> None:
-        for mesh in (mesh for meshes in self._meshes.values() for mesh in meshes):
-            mesh.opacity = opacity
+        if (robot := self._robot) is not None:
+            opacity.on_update(lambda event: robot.fade(opacity.value))
 
     def _say_distances(self, solver: str) -> None:
         centres = {
@@ -134,12 +170,10 @@ class Stage:
         flange = self.recording.present.base_T_flange[sample]
         moves = self.recording.mounting is Mounting.EYE_IN_HAND
         base_T_parent = flange if moves else np.eye(4)
-        if self._links is not None:
-            for link, meshes in self._meshes.items():
-                for mesh in meshes:
-                    _place(mesh, base_T_parent @ self._links[sample, link])
+        if self._robot is not None and self._links is not None:
+            self._robot.place(base_T_parent @ self._links[sample])
         for frustum, estimate in zip(self._frusta, self.estimates, strict=True):
-            _place(frustum, base_T_parent @ estimate.pose)
+            place(frustum, base_T_parent @ estimate.pose)
         self._frusta[0].image = self._photograph(sample)
         self._show_target(flange if not moves else np.eye(4))
 
@@ -174,7 +208,8 @@ class Stage:
             self.server.stop()
 
 
-def _place(handle: Any, base_T_thing: Array) -> None:
+def place(handle: Any, base_T_thing: Array) -> None:
+    """Put something of a scene at a pose (4, 4) m."""
     handle.wxyz, handle.position = se3.to_quat_wxyz(base_T_thing), base_T_thing[:3, 3]
 
 

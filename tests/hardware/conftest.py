@@ -11,8 +11,20 @@ from hecbench_hardware.kinematics import ARMS
 from hecbench_hardware.ur.robot import UrRobot
 from hecbench_hardware.ur.stream import Supervision
 
+from hecbench.errors import HecbenchError
+
 PATIENT = Supervision(max_age_s=1.0, late_s=10.0, leniency=10.0)
 """A busy test machine delays the stream; a laboratory's does not."""
+
+
+@pytest.fixture(scope="session")
+def drawable():
+    from hecbench_hardware.lab.gl import open_context
+
+    try:
+        open_context(16, 16).free()
+    except HecbenchError as error:
+        pytest.skip(str(error))
 
 
 @pytest.fixture

@@ -16,6 +16,7 @@ from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel
 from hecbench.robots.model import RobotModel, load_robot
+from hecbench.robots.posed import cached_robot
 from hecbench.se3 import Array
 from hecbench_hardware.kinematics import ARMS, JOINT_NAMES, Arm
 from hecbench_hardware.lab.scene import FlangeTag, Scene, Surroundings
@@ -76,12 +77,17 @@ class Station:
         """Whether the robot's model brings the gripper's meshes."""
         return self.model in ARMS and self.gripper.name == "robotiq_2f_85"
 
+    @cached_property
+    def _joint_limits_rad(self) -> Array:
+        return cached_robot(self.model, meshes=False).limits(self.joint_names)
+
     @property
     def limits(self) -> Limits:
         """The lab's own: nothing real can break, but the flange stays above the table."""
+        lower, upper = np.clip(self._joint_limits_rad, -2 * np.pi, 2 * np.pi).T
         return Limits(
-            joint_lower_rad=(-2 * np.pi,) * 6,
-            joint_upper_rad=(2 * np.pi,) * 6,
+            joint_lower_rad=tuple(lower),
+            joint_upper_rad=tuple(upper),
             joint_speed_rad_s=3.0,
             joint_acceleration_rad_s2=10.0,
             tool_speed_m_s=1.0,

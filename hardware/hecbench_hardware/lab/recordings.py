@@ -146,6 +146,19 @@ def depth_recording(
     return with_pictures(started, station, rng, room=int(rng.integers(1, 2**31)), stereo=StereoSensor())
 
 
+def cell(station: Station, calibration: int, camera: CameraModel) -> Recording:
+    """One calibration's cell as a person would describe it: the tag, first joints, and roughly where the camera is."""
+    first = station.configuration_rad(calibration)
+    truth = station.camera_pose(calibration)
+    start = se3.looking(truth[:3, 3].round(1), station.arm.forward(first)[:3, 3].round(1))
+    return replace(
+        described(station, f"lab_cell_{calibration:02d}", first[None], truth, camera),
+        target=station.flange_tag(calibration).target,
+        initial_parent_T_camera=start,
+        truth_parent_T_camera=None,
+    )
+
+
 def _nearer(station: Station, base_T_camera: Array) -> Array:
     """The camera moved along its view until it is `_DEPTH_DISTANCE_M` from what it looks at."""
     nearer = base_T_camera.copy()

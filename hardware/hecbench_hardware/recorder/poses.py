@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hecbench import next_view, se3
 from hecbench.errors import InputError
@@ -29,7 +30,7 @@ _MARGIN = 0.05
 
 
 _LOOKS = 300
-_WANDER_RAD = np.array([1.5, 0.6, 0.6, 1.2, 1.2, 3.0])
+WANDER_RAD = np.array([1.5, 0.6, 0.6, 1.2, 1.2, 3.0])
 """How far candidates for views of the robot go from the first sample's joints."""
 
 
@@ -80,16 +81,16 @@ def diverse_plan(
     """
     seen, parent_T_camera, carrier_T_target, start = _seed(cell, arm)
     camera, target = cell.present.camera, cell.present.target
-    camera_T_target = _candidates(seen, view or View(), rng)
-    camera_T_target = camera_T_target[_in_view(camera_T_target, camera, target.points_m)]
-    hand = parent_T_camera @ camera_T_target @ se3.inverse(carrier_T_target)
+    poses = candidates(seen, view or View(), rng)
+    poses = poses[in_view(poses, camera, target.points_m)]
+    hand = parent_T_camera @ poses @ se3.inverse(carrier_T_target)
     base_T_flange = hand if cell.mounting is Mounting.EYE_TO_HAND else se3.inverse(hand)
-    joints = _reachable(base_T_flange, arm, start, limits)
+    joints = reachable(base_T_flange, arm, start, limits)
     chosen = [start]
     for pick in _spread(arm.forward(joints), arm.forward(start), len(joints)):
         if len(chosen) == count:
             break
-        if _free_path(arm, start, joints[pick], limits):
+        if free_path(arm, start, joints[pick], limits):
             chosen.append(joints[pick])
     return _toured(cell, np.array(chosen), arm, limits, count)
 
@@ -104,7 +105,7 @@ def informative_plan(
 ) -> Recording:
     """A plan of `count` poses in which the robot itself tells most about the camera, for cells without a target.
 
-    Candidates are joints drawn evenly around the first sample's, no further than `_WANDER_RAD`: self-collision is not
+    Candidates are joints drawn evenly around the first sample's, no further than `WANDER_RAD`: self-collision is not
     modelled, and an arm that is folded as at the start stays clear of itself.
 
     Args:
@@ -131,8 +132,8 @@ def informative_plan(
                 f"{cell.name}: planning views of the robot needs {name}, roughly; add it to the cell"
             )
     view, start = next_view.RobotView(cell), six_joints(cell.present.joints_rad[0])
-    drawn = start + rng.uniform(-1, 1, (_LOOKS, 6)) * _WANDER_RAD
-    free = [joints for joints in drawn if _free_path(arm, start, joints, limits)]
+    drawn = start + rng.uniform(-1, 1, (_LOOKS, 6)) * WANDER_RAD
+    free = [joints for joints in drawn if free_path(arm, start, joints, limits)]
     if len(free) < count:
         raise InputError(
             f"{cell.name}: only {len(free)} of {count} poses can be reached within the limits: ask for fewer, widen"
@@ -194,7 +195,7 @@ def _seed(cell: Recording, arm: Arm) -> tuple[Array, Array, Array, Array]:
     )
 
 
-def _candidates(seen: Array, view: View, rng: np.random.Generator) -> Array:
+def candidates(seen: Array, view: View, rng: np.random.Generator) -> Array:
     """Target poses (N, 4, 4) in the camera: distance, place in the image, tilt and roll drawn evenly."""
     n = _CANDIDATES
     distance = float(np.linalg.norm(seen[:3, 3])) * rng.uniform(view.nearest, view.furthest, n)
@@ -216,17 +217,19 @@ def _faced(camera_R_target: Array) -> Array:
     return np.asarray(se3.so3_exp(turn * axis) @ camera_R_target)
 
 
-def _in_view(camera_T_target: Array, camera: CameraModel, points_m: Array) -> Array:
-    """Which poses (N,) show the whole target, clear of the edges; distortion is left out."""
+def in_view(
+    camera_T_target: Array, camera: CameraModel, points_m: Array, margin: float = _MARGIN
+) -> NDArray[np.bool_]:
+    """Which poses (N,) show the whole target, `margin` of the image clear of its edges; distortion is left out."""
     points = se3.transform_points(camera_T_target, points_m)
     projected = points @ camera.intrinsics.T
     depth = np.maximum(projected[..., 2:], 1e-9)
     size = np.array([camera.width, camera.height])
-    inside = np.abs(projected[..., :2] / depth / size - 0.5) < 0.5 - _MARGIN
+    inside = np.abs(projected[..., :2] / depth / size - 0.5) < 0.5 - margin
     return np.asarray(inside.all(axis=(1, 2)))
 
 
-def _reachable(base_T_flange: Array, arm: Arm, start: Array, limits: Limits) -> Array:
+def reachable(base_T_flange: Array, arm: Arm, start: Array, limits: Limits) -> Array:
     """The joints (M, 6) nearest to the start of every pose that has some within the limits."""
     found = []
     for pose in base_T_flange:
@@ -243,15 +246,15 @@ def _reachable(base_T_flange: Array, arm: Arm, start: Array, limits: Limits) -> 
 def _spread(poses: Array, first: Array, count: int) -> list[int]:
     """Indices of poses (M, 4, 4), each the furthest from the first pose and from those before it."""
     order: list[int] = []
-    nearest = _apart(poses, first)
+    nearest = apart(poses, first)
     for _ in range(count):
         pick = int(nearest.argmax())
         order.append(pick)
-        nearest = np.minimum(nearest, _apart(poses, poses[pick]))
+        nearest = np.minimum(nearest, apart(poses, poses[pick]))
     return order
 
 
-def _apart(poses: Array, other: Array) -> Array:
+def apart(poses: Array, other: Array) -> Array:
     """How different poses (M, 4, 4) are from another, radians."""
     turn, shift = se3.rotation_error_rad(poses, other), se3.translation_error_m(poses, other)
     return np.asarray(np.hypot(turn, shift / _METRES_PER_RADIAN))
@@ -263,7 +266,7 @@ def _short_tour(joints: Array, arm: Arm, limits: Limits) -> Array:
     while left:
         left.sort(key=lambda there: float(np.abs(there - tour[-1]).max()))
         for k, there in enumerate(left):
-            if _free_path(arm, tour[-1], there, limits):
+            if free_path(arm, tour[-1], there, limits):
                 tour.append(left.pop(k))
                 break
         else:
@@ -271,7 +274,7 @@ def _short_tour(joints: Array, arm: Arm, limits: Limits) -> Array:
     return np.array(tour)
 
 
-def _free_path(arm: Arm, start: Array, end: Array, limits: Limits) -> bool:
+def free_path(arm: Arm, start: Array, end: Array, limits: Limits) -> bool:
     try:
         check_motion(arm, JointMotion(arm, start, end), limits)
     except InputError:

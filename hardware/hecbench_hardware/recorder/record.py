@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -65,36 +65,40 @@ class Recorder:
             if sample_id not in self._session.done:
                 self._visit(sample_id, joints[number])
                 self.report(f"{number + 1}/{len(joints)} sample {sample_id}")
-        return self._finish(list(self.cell.sample_ids))
+        return self.finish(list(self.cell.sample_ids))
 
     def follow_hand(self, more: Callable[[int], bool]) -> Recording:
         """Record wherever the operator holds the arm still, as long as `more(number of samples)` says so."""
         with self.robot.freedrive():
             while more(len(self._session.samples)):
                 try:
-                    self._sample(f"{len(self._session.samples):06d}")
+                    self.take(f"{len(self._session.samples):06d}")
                 except DeviceFault as error:
                     if error.fault is not Fault.LATE:
                         raise
                     self.report(f"{error}; hold the arm still")
-        return self._finish([line.id for line in self._session.samples])
+        return self.finish([line.id for line in self._session.samples])
 
     def _visit(self, sample_id: str, joints_rad: Array) -> None:
         for attempt in range(_ATTEMPTS):
             try:
                 self.robot.move_joints(joints_rad)
-                self._sample(sample_id)
+                self.take(sample_id)
                 return
             except DeviceFault as error:
                 again = attempt + 1 < _ATTEMPTS and error.fault is not Fault.CAMERA
                 if not (again and self.robot.recover(self.acknowledge)):
                     raise
 
-    def _sample(self, sample_id: str) -> None:
+    def take(self, sample_id: str) -> SampleLine:
+        """One sample where the arm stands.
+
+        Raises:
+            DeviceFault: The arm moves, or a device failed; nothing was recorded.
+        """
         before = self.robot.settle()
         if self.camera is None:
-            self._session.append(_line(sample_id, before))
-            return
+            return self._session.append(_line(sample_id, before))
         frames, states = [], []
         for _ in range(self.frames):
             frames.append(self.camera.grab())
@@ -108,7 +112,7 @@ class Recorder:
         images = [frame.image for frame in frames]
         average = _average(images, self.camera.name, self.cell)
         line = _line(sample_id, states[-1])
-        line.joints_rad = joints.mean(axis=0).tolist()
+        line.joints_rad = _known(joints.mean(axis=0))
         line.joint_change_rad = joint_change
         line.robot_stamp_s = float(np.mean([state.host_stamp_s for state in states]))
         line.camera_stamp_s = float(np.mean([frame.host_stamp_s for frame in frames]))
@@ -116,27 +120,38 @@ class Recorder:
         line.frames = [frame.source for frame in frames]
         line.image_change = float(np.abs(images[-1].astype(float) - images[0]).mean())
         line.image = self._session.save_image(sample_id, average)
-        self._session.append(line)
+        return self._session.append(line)
 
-    def _finish(self, ids: list[str]) -> Recording:
+    @property
+    def samples(self) -> Sequence[SampleLine]:
+        """What is recorded so far."""
+        return self._session.samples
+
+    def undo(self) -> SampleLine:
+        """Take the last sample back."""
+        return self._session.drop_last()
+
+    def finish(self, ids: list[str]) -> Recording:
+        """Write the recording of these samples."""
         recorded = {line.id: line for line in self._session.samples}
         if not ids:
             raise InputError(f"{self.folder}: no sample was recorded; hold the arm still and try again")
         lines = [recorded[name] for name in ids]
         with_images = all(line.image for line in lines)
-        description = self.cell.robot or RobotDescription(model=self.robot.arm.name)
+        with_joints = all(line.joints_rad for line in lines)
         recording = replace(
             self.cell,
             name=self.folder.resolve().name,
             sample_ids=tuple(ids),
             camera=self.cell.camera or (None if self.camera is None else self.camera.intrinsics()),
-            robot=replace(description, joint_names=description.joint_names or JOINT_NAMES),
-            joints_rad=np.array([line.joints_rad for line in lines]),
+            robot=self._described() if with_joints else self.cell.robot,
+            joints_rad=np.array([line.joints_rad for line in lines]) if with_joints else None,
             base_T_flange=np.array([line.base_T_flange for line in lines]),
             robot_stamp_s=np.array([line.robot_stamp_s for line in lines]),
             camera_stamp_s=np.array([line.camera_stamp_s for line in lines]) if with_images else None,
             images=tuple(self.folder / str(line.image) for line in lines) if with_images else None,
             masks=None,
+            depths=None,
             camera_T_target=None,
             corners_px=None,
             truth_parent_T_camera=None,
@@ -145,11 +160,15 @@ class Recorder:
         save(recording, self.folder)
         return recording
 
+    def _described(self) -> RobotDescription:
+        description = self.cell.robot or RobotDescription(model=self.robot.arm.name)
+        return replace(description, joint_names=description.joint_names or JOINT_NAMES)
+
 
 def _line(sample_id: str, state: RobotState) -> SampleLine:
     return SampleLine(
         id=sample_id,
-        joints_rad=state.joints_rad.tolist(),
+        joints_rad=_known(state.joints_rad),
         base_T_flange=state.base_T_flange.tolist(),
         nominal_base_T_flange=state.nominal_base_T_flange.tolist(),
         kinematics_gap_mm=1e3
@@ -158,6 +177,10 @@ def _line(sample_id: str, state: RobotState) -> SampleLine:
         robot_stamp_s=state.host_stamp_s,
         robot_clock_s=state.robot_stamp_s,
     )
+
+
+def _known(joints_rad: Array) -> list[float] | None:
+    return joints_rad.tolist() if np.isfinite(joints_rad).all() else None
 
 
 def _average(images: list[NDArray[np.uint8]], camera: str, cell: Recording) -> NDArray[np.uint8]:

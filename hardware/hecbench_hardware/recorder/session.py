@@ -28,7 +28,8 @@ class SampleLine(msgspec.Struct, kw_only=True, forbid_unknown_fields=True):
     """What is kept of one sample. Stamps are seconds since 1970, clocks those of the devices."""
 
     id: str
-    joints_rad: list[float]
+    joints_rad: list[float] | None
+    """None where only the flange's pose is known."""
     base_T_flange: list[list[float]]
     """The controller's, with its factory calibration."""
     nominal_base_T_flange: list[list[float]]
@@ -103,10 +104,26 @@ class Session:
         files.write_bytes(self.folder / name, encode_png(image))
         return name
 
-    def append(self, sample: SampleLine) -> None:
-        """Add one sample for good."""
+    def append(self, sample: SampleLine) -> SampleLine:
+        """Add one sample for good, and return it."""
         with self._path.open("ab") as diary:
             diary.write(msgspec.json.encode(sample) + b"\n")
             diary.flush()
             os.fsync(diary.fileno())
         self.samples.append(sample)
+        return sample
+
+    def drop_last(self) -> SampleLine:
+        """Take the last sample back: its line first, then its image.
+
+        Raises:
+            InputError: There is none.
+        """
+        if not self.samples:
+            raise InputError(f"{self.folder}: has no sample to take back")
+        lines = files.read_bytes(self._path).splitlines(keepends=True)
+        files.write_bytes(self._path, b"".join(lines[:-1]))
+        sample = self.samples.pop()
+        if sample.image is not None:
+            (self.folder / sample.image).unlink(missing_ok=True)
+        return sample

@@ -3,21 +3,28 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from typing import Any
 
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import DeviceSpec, Kind, SuiteSpec
+from hecbench_hardware.options import number
 
 MARKERS, VIEWS, PHOTOGRAPHS, DEPTH = "markers", "views", "photographs", "depth"
 
 
 def open_lab(options: Mapping[str, str]) -> Any:
-    """The arm, in its home pose."""
+    """The arm, in its home pose; nothing of it goes below `floor`, m."""
     from hecbench_hardware.lab.arm import LabRobot
     from hecbench_hardware.lab.cells import station
 
-    return LabRobot(station(options.get("arm", "ur5e"), options.get("urdf")))
+    robot = LabRobot(station(options.get("arm", "ur5e"), options.get("urdf")))
+    box = robot.limits.workspace
+    x, y, z = box.lower_m
+    floor = replace(box, lower_m=(x, y, number(options, "floor", z)))
+    robot.limits = replace(robot.limits, workspace=floor)
+    return robot
 
 
 def make(level: str, index: int, seed: int) -> Any:
@@ -43,7 +50,7 @@ def hecbench_robots() -> Iterable[DeviceSpec]:
         imports=("mujoco",),
         open=open_lab,
         simulated=True,
-        options=("arm", "urdf"),
+        options=("arm", "urdf", "floor"),
     )
 
 

@@ -188,6 +188,7 @@ def hecbench_solvers() -> Iterable[SolverSpec]:
         factory=keypoints,
         needs=frozenset({Need.IMAGES, Need.JOINTS, Need.ROBOT_MODEL, Need.INTRINSICS}),
         reference="after Lee et al. 2020 (DREAM)",
+        slow=True,
         options=(
             MODEL_OPTION,
             Option("refine", _yes, "align with the network's masks from there: yes or no"),

@@ -4,22 +4,10 @@ import numpy as np
 import pytest
 from hecbench_hardware.lab import cells
 
-from hecbench.errors import HecbenchError
-
 
 @pytest.fixture(scope="session")
 def station():
     return cells.ur5e()
-
-
-@pytest.fixture(scope="session")
-def drawable():
-    from hecbench_hardware.lab.gl import open_context
-
-    try:
-        open_context(16, 16).free()
-    except HecbenchError as error:
-        pytest.skip(str(error))
 
 
 @pytest.fixture(scope="session")

@@ -1,7 +1,5 @@
 """Made-up results of studies whose every number is known."""
 
-import shutil
-
 import numpy as np
 import pytest
 
@@ -132,27 +130,3 @@ def study_runs(count=20, seed=0):
 def studies():
     """Results of all studies."""
     return study_runs(count=6)
-
-
-@pytest.fixture(scope="module")
-def browser(tmp_path_factory):
-    """Chromium, driven; skipped where it or its driver is absent."""
-    webdriver = pytest.importorskip("selenium.webdriver")
-    programs = [shutil.which(name) for name in ("chromium", "chromium-browser", "google-chrome")]
-    driver = shutil.which("chromedriver")
-    if driver is None or not any(programs):
-        pytest.skip("needs Chromium and chromedriver")
-    options = webdriver.ChromeOptions()
-    options.binary_location = next(filter(None, programs))
-    profile = tmp_path_factory.mktemp("profile")
-    for argument in (
-        "--headless=new",
-        "--no-sandbox",
-        "--enable-unsafe-swiftshader",
-        f"--user-data-dir={profile}",
-    ):
-        options.add_argument(argument)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    started = webdriver.Chrome(options=options, service=webdriver.ChromeService(driver))
-    yield started
-    started.quit()

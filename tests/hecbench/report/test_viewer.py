@@ -40,8 +40,8 @@ def test_cameras_and_links_are_where_the_answer_puts_them(stage, recording):
         for frustum, estimate in zip(stage._frusta, stage.estimates, strict=True):
             np.testing.assert_allclose(pose(frustum), estimate.parent_T_camera, atol=1e-6)
         links = stage._links[sample]
-        for link, meshes in stage._meshes.items():
-            np.testing.assert_allclose(pose(meshes[0]), links[link], atol=1e-6)
+        for link, mesh in stage._robot._meshes:
+            np.testing.assert_allclose(pose(mesh), links[link], atol=1e-6)
     assert stage._frusta[0].image.shape[:2] == (360, 640)
 
 

@@ -1,0 +1,171 @@
+"""The verb ``hecbench cockpit``."""
+
+from __future__ import annotations
+
+import time
+from contextlib import ExitStack
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from hecbench.commands import choices
+from hecbench.commands.devices import device_settings, open_device
+from hecbench.errors import InputError
+
+if TYPE_CHECKING:
+    from hecbench.recording import Recording
+    from hecbench.verdict import Verdict
+    from hecbench_hardware.cockpit.choosing import Devices
+    from hecbench_hardware.cockpit.session import Session
+    from hecbench_hardware.devices import Camera, Robot
+
+_SIMULATED = "lab"
+_HOST = "127.0.0.1"
+_LAB_PICTURE = {"width": "1224", "height": "1024", "noise": "2"}
+_CALIBRATION = "calibration"
+_TICK_S, _REST_S = 0.2, 0.05
+"""Between two looks, and the least of it that is left to the page."""
+
+
+@click.command()
+@click.argument("cell", type=choices.ANY_PATH, required=False)
+@click.option(
+    "--out", type=choices.FOLDER, help="Of the recording; an unfinished one goes on. Default: out/cockpit."
+)
+@click.option("--robot", help="A robot of `hecbench plugins`, or `typed`. Default: chosen on the page.")
+@click.option("--camera", help="A camera of `hecbench plugins`. Default: chosen on the page.")
+@click.option("--host", help="Address of the robot's controller.")
+@click.option("--arm", is_flag=True, help="Let a robot that is not simulated move, after a question here.")
+@click.option("--freedrive", is_flag=True, help="Guide the arm by hand all the time; it is not driven then.")
+@click.option("--limits", type=choices.FILE, help="JSON file of limits; see docs/hardware-safety.md.")
+@click.option("--set", "settings", multiple=True, metavar="DEVICE.NAME=VALUE", help="E.g. camera.index=1.")
+@click.option(
+    "--frames", type=click.IntRange(min=1), default=1, show_default=True, help="Averaged per sample."
+)
+@click.option(
+    "--tolerance-mm",
+    type=click.FloatRange(min=0, min_open=True),
+    default=5.0,
+    show_default=True,
+    help="The error in the workspace that you can live with; the grade is relative to it.",
+)
+@click.option("--port", type=click.IntRange(0, 65535), default=8080, show_default=True)
+@choices.threads
+def cockpit(
+    cell: Path | None,
+    out: Path | None,
+    robot: str | None,
+    camera: str | None,
+    host: str | None,
+    arm: bool,
+    freedrive: bool,
+    limits: Path | None,
+    settings: tuple[str, ...],
+    frames: int,
+    tolerance_mm: float,
+    port: int,
+) -> None:
+    """Record and calibrate a cell in the browser: what to do next, and how good it is so far.
+
+    CELL is a recording folder that describes camera, target and mounting; without it the simulated cell of the lab is
+    used. The recording is left in --out, the calibration in --out/calibration.
+    """
+    from hecbench import preparation
+    from hecbench.report import viewer
+    from hecbench_hardware.cockpit.choosing import Devices, ask
+    from hecbench_hardware.cockpit.page import Page
+    from hecbench_hardware.cockpit.session import Session
+
+    if arm and robot is None:
+        raise InputError(
+            "--arm: name the arm that may move with --robot; none that is chosen on the page may"
+        )
+    if cell is None and {robot, camera} - {None, _SIMULATED}:
+        raise InputError(
+            "give a CELL that describes camera, target and mounting; docs/cockpit.md makes a first one"
+        )
+    described = None if cell is None else preparation.load_recording(cell).without_truth()
+    given = device_settings(settings)
+    if limits is not None:
+        given["robot"]["limits"] = str(limits)
+    with ExitStack() as opened:
+        server = viewer.open_server(_HOST, port)
+        opened.callback(server.stop)
+        click.echo(f"http://{_HOST}:{server.get_port()} (end with Ctrl-C)")
+        sessions: list[Session] = []
+
+        def use(chosen: Devices) -> None:
+            with ExitStack() as trying:
+                device, eye = _open(trying, chosen, given)
+                _take_control(trying, device, arm, freedrive)
+                known = described or _lab_cell(given["camera"], eye)
+                driven = device.enabled and not freedrive
+                sessions.append(Session(known, device, eye, out or Path("out/cockpit"), frames, driven))
+                opened.enter_context(trying.pop_all())
+
+        suggested = Devices(robot or _SIMULATED, camera or _SIMULATED, host)
+        if robot is None and camera is None:
+            ask(server, suggested, simulated_only=cell is None, use=use)
+        else:
+            use(suggested)
+        page = Page(server, sessions[0], tolerance_mm, partial(finish, tolerance_mm))
+        opened.callback(page.close)
+        while True:
+            began = time.monotonic()
+            page.tick()
+            time.sleep(max(_REST_S, _TICK_S - (time.monotonic() - began)))
+
+
+def _open(opened: ExitStack, chosen: Devices, given: dict[str, dict[str, str]]) -> tuple[Robot, Camera]:
+    """The devices, the camera showing the robot when it draws its pictures."""
+    from hecbench.specs import Kind
+    from hecbench_hardware.devices import FollowsRobot
+
+    host = {"host": chosen.host} if chosen.host else {}
+    table = {"floor": "0"} if chosen.robot == _SIMULATED else {}
+    device: Robot = open_device(Kind.ROBOT, chosen.robot, table | given["robot"] | host)
+    opened.callback(device.close)
+    drawn = _LAB_PICTURE if chosen.camera == _SIMULATED else {}
+    eye: Camera = open_device(Kind.CAMERA, chosen.camera, drawn | given["camera"])
+    opened.callback(eye.close)
+    if isinstance(eye, FollowsRobot):
+        eye.follow(device)
+    return device, eye
+
+
+def _take_control(opened: ExitStack, robot: Robot, armed: bool, freedrive: bool) -> None:
+    """Enable a simulated arm, or a real one that is armed; the others are only read."""
+    from hecbench_hardware.arming import Operator, take_control
+    from hecbench_hardware.robots.typed import TypedRobot
+
+    if isinstance(robot, TypedRobot) or not (robot.simulated or armed or freedrive):
+        return
+    what = "guided by hand" if freedrive else "to poses that are shown on the page"
+    take_control(robot, what, armed=armed, confirm=Operator(robot).confirm)
+    if freedrive:
+        opened.enter_context(robot.freedrive())
+
+
+def _lab_cell(options: dict[str, str], eye: Camera) -> Recording:
+    """The lab's arm with its tag, as a person would describe it."""
+    from hecbench_hardware.lab import cells, recordings
+
+    station = cells.station(options.get("arm", "ur5e"), options.get("urdf"))
+    camera = eye.intrinsics()
+    assert camera is not None
+    return recordings.cell(station, int(options.get("calibration", 0)), camera)
+
+
+def finish(tolerance_mm: float, session: Session) -> Verdict:
+    """Calibrate what was recorded by every method that can."""
+    from hecbench.commands.calibrate import calibrate_into
+    from hecbench.running import planning
+
+    recording = session.recording()
+    specs = planning.solvers_for((), recording)
+    folder = session.folder / _CALIBRATION
+    found, page = calibrate_into(folder, recording, specs, choices.run_options(0), tolerance_mm)
+    click.echo(f"report: {page}", err=True)
+    return found

@@ -1,0 +1,81 @@
+"""What one picture shows: the target's corners and its pose."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hecbench import preparation
+from hecbench.lens import CameraModel
+from hecbench.recording import ImageSource, Recording
+from hecbench.se3 import Array
+
+_FOCAL_IN_WIDTHS = 1.2
+"""Of a camera whose K is not known: only where the target is seen is used then."""
+_CORNER_RGB, _CORNER_PX = (255, 60, 60), 2
+_WIDEST_PX = 640
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """The target in one picture.
+
+    Attributes:
+        corners_px: (P, 2), NaN where a point is hidden.
+        camera_T_target: (4, 4) m, None while K is not known or the target has no pose.
+    """
+
+    corners_px: Array
+    camera_T_target: Array | None
+
+
+def look_for(cell: Recording, image: ImageSource, camera: CameraModel | None) -> Seen | None:
+    """The target of a cell in an image; None where it is not seen or the cell has none.
+
+    Raises:
+        InputError: The image cannot be read.
+    """
+    if cell.target is None:
+        return None
+    known = camera is not None and camera.K is not None
+    single = Recording(
+        name=cell.name,
+        mounting=cell.mounting,
+        sample_ids=("now",),
+        base_T_flange=np.eye(4)[None],
+        camera=camera if known else _provisional(np.asarray(image)),
+        target=cell.target,
+        images=(image,),
+    )
+    found = preparation.prepare(single)
+    if found.corners_px is None or not np.isfinite(found.corners_px).any():
+        return None
+    poses = found.camera_T_target
+    usable = known and poses is not None and np.isfinite(poses[0]).all()
+    return Seen(found.corners_px[0], poses[0] if usable and poses is not None else None)
+
+
+def _provisional(image: NDArray[np.uint8]) -> CameraModel:
+    height, width = image.shape[:2]
+    focal = _FOCAL_IN_WIDTHS * width
+    K = np.array([[focal, 0, (width - 1) / 2], [0, focal, (height - 1) / 2], [0, 0, 1]])
+    return CameraModel(width, height, K)
+
+
+def marked(image: NDArray[np.uint8], seen: Seen) -> NDArray[np.uint8]:
+    """A copy of the image with the corners marked, twice as large in larger pictures."""
+    picture = image.copy()
+    height, width = picture.shape[:2]
+    reach = max(_CORNER_PX, width // 300)
+    for u, v in seen.corners_px[np.isfinite(seen.corners_px).all(1)].round().astype(int):
+        rows = slice(max(v - reach, 0), min(v + reach + 1, height))
+        picture[rows, max(u - reach, 0) : min(u + reach + 1, width)] = _CORNER_RGB
+    return picture
+
+
+def small(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """The image at most 640 px wide, as a page shows it."""
+    step = -(-image.shape[1] // _WIDEST_PX)
+    return np.ascontiguousarray(image[::step, ::step])
