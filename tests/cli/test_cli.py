@@ -187,16 +187,6 @@ def test_conformance_verb(hecbench):
     assert all(check["passed"] for check in json.loads(done.stdout))
 
 
-def test_demo_makes_tables_and_a_report(hecbench, tmp_path):
-    done = hecbench("demo", "--samples", 2, "--out", "demo", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
-    assert "ur3e_photographs: GOOD" in done.stdout
-    assert "markers: small_tag_2m" in done.stdout
-    page = (tmp_path / "demo" / "report.html").read_text()
-    assert len(page) < 3e6
-    assert page.index("ur3e_photographs") < page.index("markers: small_tag_2m")
-
-
 def test_help_imports_nothing_heavy():
     code = (
         "import sys; sys.argv = ['hecbench', '--help']\n"

@@ -2,8 +2,6 @@
 
 import json
 import os
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,11 +14,6 @@ from hecbench.recording import Mounting
 from hecbench.storage import recording_io
 
 MARKUP = "[/x] cell [left] $\\foo$ <b>&amp;"
-
-
-def hecbench(*words, cwd):
-    command = [sys.executable, "-m", "hecbench", *map(str, words)]
-    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, check=False)
 
 
 def everything_below(folder):
@@ -45,7 +38,7 @@ def cell(tmp_path, rng):
     return make
 
 
-def test_markup_in_a_name_is_shown_as_it_is(cell):
+def test_markup_in_a_name_is_shown_as_it_is(hecbench, cell):
     work = cell(MARKUP, ["[bold]a[/bold]", "[/]"])
     for words in (["check", "cell"], ["solve", "cell", "--solver", "park"]):
         done = hecbench(*words, cwd=work)
@@ -61,7 +54,7 @@ def test_markup_in_a_name_is_shown_as_it_is(cell):
 HOSTILE = ["../../../escaped", "/abs/escaped", "..", "a/../../b", "con\x00trol", "x" * 300, ".hidden", "a\nb"]
 
 
-def test_hostile_ids_and_names_write_nothing_outside(tmp_path):
+def test_hostile_ids_and_names_write_nothing_outside(hecbench, tmp_path):
     work = tmp_path / "deep" / "er" / "work"
     given = photographs()
     recording = replace(given, name="../../outside", sample_ids=tuple(HOSTILE[: len(given)]))
@@ -85,7 +78,7 @@ def test_hostile_ids_and_names_write_nothing_outside(tmp_path):
 
 @pytest.mark.parametrize("key", ["image", "mask"])
 @pytest.mark.parametrize("place", ["../secret.png", "/etc/hostname"])
-def test_pictures_outside_the_folder_are_not_read(tmp_path, key, place):
+def test_pictures_outside_the_folder_are_not_read(hecbench, tmp_path, key, place):
     recording_io.save(photographs(), tmp_path / "cell")
     (tmp_path / "secret.png").write_bytes((tmp_path / "cell" / "images" / "000000.png").read_bytes())
     content = json.loads((tmp_path / "cell" / "recording.json").read_text())
@@ -97,7 +90,7 @@ def test_pictures_outside_the_folder_are_not_read(tmp_path, key, place):
     assert len(done.stderr.strip().splitlines()) == 1
 
 
-def test_robots_outside_the_folder_are_not_read(tmp_path):
+def test_robots_outside_the_folder_are_not_read(hecbench, tmp_path):
     recording_io.save(photographs(), tmp_path / "cell")
     content = json.loads((tmp_path / "cell" / "recording.json").read_text())
     for robot in ({"urdf": "../robot.urdf"}, {"model": "/etc/passwd"}, {"model": "../robot.urdf"}):
@@ -110,7 +103,7 @@ def test_robots_outside_the_folder_are_not_read(tmp_path):
         assert os.path.basename(value) in done.stderr + done.stdout
 
 
-def test_trials_embed_no_foreign_picture(tmp_path):
+def test_trials_embed_no_foreign_picture(hecbench, tmp_path):
     np.save(tmp_path / "secret", np.zeros(1))
     (tmp_path / "x.png").write_bytes(b"secret picture")
     out = tmp_path / "out"

@@ -2,32 +2,29 @@
 
 import json
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-pytestmark = pytest.mark.timeout(
-    1200
-)  # every method on the photographs: half a minute of a core, more on a busy one
 NUMBER = re.compile(r"-?\d+(?:\.\d+)?")
 
 
-@pytest.fixture(scope="module")
-def verdict(tmp_path_factory):
-    """The verdict on the photographs that come with the package, as `hecbench demo` makes it."""
-    from hecbench_datasets import photographs
-
-    from hecbench.running import calibrating, planning
-    from hecbench.running.solving import Options
-
-    recording = photographs.make(photographs.UR3E, 0, 0)
-    specs = planning.solvers_for((), recording)
-    examined = calibrating.examine(recording)
-    estimates = calibrating.solved(examined, specs, Options())
-    found = calibrating.judged(examined, specs, estimates)
-    found.save(tmp_path_factory.mktemp("demo") / "verdict.json")
-    return json.loads(json.dumps(found.to_json()))
+@pytest.mark.timeout(1200)  # every method on the photographs: half a minute of a core, more on a busy one
+def test_the_demo_says_what_the_readme_says(tmp_path):
+    command = [sys.executable, "-m", "hecbench", "demo", "--samples", "2", "--out", "demo"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "ur3e_photographs: GOOD" in done.stdout
+    assert "markers: small_tag_2m" in done.stdout
+    page = (tmp_path / "demo/report.html").read_text()
+    assert len(page) < 3e6
+    assert page.index("ur3e_photographs") < page.index("markers: small_tag_2m")
+    verdict = json.loads((tmp_path / "demo/verdict.json").read_text())
+    agrees_with_the_table(verdict)
+    agrees_with_the_sentence(verdict)
 
 
 def rows():
@@ -37,7 +34,7 @@ def rows():
     return {row[0]: row[1:] for row in table[2:]}
 
 
-def test_the_table(verdict):
+def agrees_with_the_table(verdict):
     held_out = {e["solver"]: e["held_out"] for e in verdict["estimates"] if e["held_out"]}
     apart = {a["solver"]: a["distance_mm"] for a in [*verdict["agreement"], *verdict["rivals"]]}
     assert len(rows()) == 5
@@ -52,7 +49,7 @@ def test_the_table(verdict):
             assert float(distance) == pytest.approx(apart[solver], rel=0.1)
 
 
-def test_the_verdict(verdict):
+def agrees_with_the_sentence(verdict):
     text = (ROOT / "README.md").read_text()
     said = re.search(r"The verdict on them: \*\*(.+)\*\*, expected error in the workspace (.+)\.\n", text)
     assert said[1].replace(" ", "_") == verdict["grade"]
