@@ -64,6 +64,12 @@ def bootstrap(values: ArrayLike, statistic: Callable[..., ArrayLike] = np.mean, 
     return Interval(estimate, float(interval.low), float(interval.high))
 
 
+def clustered_rms(values: ArrayLike, clusters: Sequence[Hashable], seed: int = 0) -> Interval:
+    """Root mean square of values (N,) when those of one cluster are not independent, with its interval."""
+    squares = cluster_bootstrap(np.square(values), clusters, seed)
+    return Interval(*(float(np.sqrt(end)) for end in (squares.value, squares.low, squares.high)))
+
+
 def cluster_bootstrap(values: ArrayLike, clusters: Sequence[Hashable], seed: int = 0) -> Interval:
     """The mean of values (N,) when those of one cluster (one calibration, say) are not independent.
 
@@ -72,6 +78,8 @@ def cluster_bootstrap(values: ArrayLike, clusters: Sequence[Hashable], seed: int
     """
     from scipy import stats
 
+    if len(set(clusters)) == len(clusters):
+        return bootstrap(values, seed=seed)
     values = np.asarray(values, float)
     _, labels = np.unique(np.array([repr(cluster) for cluster in clusters]), return_inverse=True)
     order = np.lexsort((values, labels))

@@ -24,6 +24,7 @@ from hecbench.exchange.stillness import (
     turns_about_one_axis,
 )
 from hecbench.recording import Mounting
+from hecbench.samples import agreement
 from hecbench.se3 import Array
 
 HINTS_NAME = "hecbench-import.yaml"
@@ -31,7 +32,7 @@ HINTS_NAME = "hecbench-import.yaml"
 
 _CURE = f"write which is meant (mounting, robot_pose, target_pose ...) into {HINTS_NAME} beside it"
 
-_STILL = 0.3
+_STILL = agreement.LARGEST_SHARE
 _CLEARLY_WORSE = 3.0
 _LEAST_SAMPLES = 5
 _ROTATION_SLACK = 0.1

@@ -6,7 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from hecbench import se3
 from hecbench.recording import Recording
@@ -39,6 +39,23 @@ def standstills(base_T_flange: Array) -> Labels:
     )
     links = coo_array((np.ones(len(near)), (known[near[:, 0]], known[near[:, 1]])), (count, count))
     return np.asarray(connected_components(links, directed=False)[1], np.int64)
+
+
+def pose_labels(recording: Recording, indices: ArrayLike) -> Labels:
+    """The number of the robot pose of each of these samples; each its own where no poses are known."""
+    chosen = np.asarray(indices, int)
+    if recording.base_T_flange is None:
+        return np.arange(len(chosen))
+    return standstills(recording.base_T_flange[chosen])
+
+
+def folds(recording: Recording, indices: ArrayLike, most: int, rng: np.random.Generator) -> list[Labels]:
+    """At most `most` sets of these samples; those of one robot pose share its error and stay together."""
+    chosen = np.asarray(indices, int)
+    labels = pose_labels(recording, chosen)
+    groups = [chosen[labels == label] for label in np.unique(labels)]
+    parts = np.array_split(rng.permutation(len(groups)), min(most, len(groups)))
+    return [np.concatenate([groups[i] for i in part]) for part in parts if len(part)]
 
 
 def one_per_robot_pose(recording: Recording) -> Recording:

@@ -109,7 +109,8 @@ def agree(first: Answer, second: Answer, points_m: Array, tolerance_m: float) ->
 def predicts_better(first: Estimate, second: Estimate, names: Sequence[str], seed: int = 0) -> bool:
     """Whether the first predicts left-out samples better than the second, by every one of these held-out numbers.
 
-    Better is a mean difference of squared residuals, sample by sample, whose 95 % bootstrap interval excludes zero.
+    Better is a mean difference of squared residuals, sample by sample, whose 95 % bootstrap interval excludes zero;
+    samples of one robot pose count together.
     """
     from hecbench import statistics
 
@@ -121,7 +122,8 @@ def predicts_better(first: Estimate, second: Estimate, names: Sequence[str], see
         if not shared:
             return False
         gain = [two[sample] ** 2 - one[sample] ** 2 for sample in shared]
-        interval = statistics.bootstrap(gain, seed=seed)
+        poses = (first.held_out or {}).get("robot_poses") or {}
+        interval = statistics.cluster_bootstrap(gain, [poses.get(sample, sample) for sample in shared], seed)
         if not interval.low > 0:  # also where there are too few samples for an interval
             return False
     return True

@@ -88,3 +88,14 @@ def test_fewer_than_five_values_have_no_interval(count):
 
 def test_root_mean_square():
     assert statistics.root_mean_square([3.0, -4.0]) == pytest.approx(np.sqrt(12.5))
+
+
+def test_repeats_of_a_value_narrow_no_interval(rng):
+    """Fifteen pictures of each of eight robot poses tell as much as one of each."""
+    values = rng.normal(2.0, 0.5, 8)
+    once = statistics.bootstrap(values, statistics.root_mean_square)
+    repeated = statistics.clustered_rms(np.repeat(values, 15), np.repeat(np.arange(8), 15).tolist())
+    assert repeated.value == pytest.approx(once.value)
+    assert repeated.high - repeated.low == pytest.approx(once.high - once.low, rel=0.1)
+    blind = statistics.bootstrap(np.repeat(values, 15), statistics.root_mean_square)
+    assert blind.high - blind.low < 0.5 * (once.high - once.low)

@@ -11,6 +11,7 @@ from hecbench import se3, statistics
 from hecbench.estimate import Estimate, Status
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
+from hecbench.samples.standstills import folds, pose_labels
 from hecbench.se3 import Array
 from hecbench.specs import Column, EvaluatorSpec, Need, ResultSection
 
@@ -34,24 +35,27 @@ def of_left_out_photographs(
     answer is counted in `failed_folds` and predicts nothing.
     """
     photographed = [i for i, image in enumerate(recording.images or ()) if image is not None]
-    folds = np.array_split(rng.permutation(photographed), min(FOLDS, len(photographed)))
+    parts = folds(recording, photographed, FOLDS, rng)
     rows: list[Array] = []
+    used: list[int] = []
     failed = 0
-    for fold in folds:
+    for fold in parts:
         fitted = solve(recording.subset([i for i in photographed if i not in fold]))
         if fitted.status is not Status.OK:
             failed += 1
             continue
-        rows.append(agreement(recording.subset(np.sort(fold)), fitted))
-    counts: dict[str, Any] = {"folds": len(folds), "failed_folds": failed}
+        used += (left_out := np.sort(fold)).tolist()
+        rows.append(agreement(recording.subset(left_out), fitted))
+    counts: dict[str, Any] = {"folds": len(parts), "failed_folds": failed}
     if not rows:
         return counts | {"samples": 0}
     distance_px, share = np.concatenate(rows).T
-    distance_px = distance_px[np.isfinite(distance_px)]
+    known = np.isfinite(distance_px)
+    distance_px, labels = distance_px[known], pose_labels(recording, used)[known]
     counts |= {"samples": len(share), "confirmed": float(share.mean())}
     if not len(distance_px):
         return counts
-    rms = statistics.bootstrap(distance_px, statistics.root_mean_square)
+    rms = statistics.clustered_rms(distance_px, labels.tolist())
     if np.isfinite(rms.low):
         counts["contour_px_interval"] = [rms.low, rms.high]
     return counts | {

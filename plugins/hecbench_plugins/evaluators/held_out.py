@@ -7,14 +7,13 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3, statistics
 from hecbench.estimate import Estimate, Status
 from hecbench.lens import same
 from hecbench.recording import CameraModel, Recording
 from hecbench.registry import hookimpl
-from hecbench.samples.standstills import standstills
+from hecbench.samples.standstills import folds, pose_labels
 from hecbench.se3 import Array
 from hecbench.specs import Column, EvaluatorSpec, Need, ResultSection
 from hecbench_plugins.markers.target_poses import project, target_poses
@@ -30,7 +29,7 @@ def held_out(
     solve: Callable[[Recording], Estimate],
     rng: np.random.Generator,
 ) -> Mapping[str, Any]:
-    """Prediction of left-out samples, 5-fold by sample: rms with its bootstrap interval, median, and each sample's.
+    """Prediction of left-out samples, 5-fold by robot pose: rms with its bootstrap interval, median, each sample's.
 
     X is the solver's on the training folds. The ruler itself refits Y = carrier_T_target there with the raw
     robot poses, identically for every solver, and predicts ``inverse(X) @ H @ Y`` for the left-out samples. A
@@ -44,8 +43,8 @@ def held_out(
     residuals: dict[str, Array] = {}
     answers: list[Array] = []
     failed = 0
-    folds = _folds(recording, usable, rng)
-    for fold in folds:
+    parts = folds(recording, usable, FOLDS, rng)
+    for fold in parts:
         training = np.setdiff1d(usable, fold)
         fitted = solve(recording.subset(training)) if len(training) else None
         if fitted is None or fitted.status is not Status.OK:
@@ -57,13 +56,16 @@ def held_out(
         for i in fold.tolist():
             off = _residuals(fitted.pose, carrier_T_target, seen_by, i)
             residuals[recording.sample_ids[i]] = off
-    found: dict[str, Any] = {"folds": len(folds), "failed_folds": failed, "samples": len(residuals)}
+    found: dict[str, Any] = {"folds": len(parts), "failed_folds": failed, "samples": len(residuals)}
     if _solved_again(answers, estimate):
         found["fold_answers"] = [answer.tolist() for answer in answers]
+    labels = pose_labels(recording, [recording.sample_ids.index(name) for name in residuals]).tolist()
+    if len(set(labels)) < len(labels):
+        found["robot_poses"] = dict(zip(residuals, labels, strict=True))
     columns = np.array(list(residuals.values())).T
     for name, values in zip(("reprojection_px", "target_mm", "target_deg"), columns, strict=False):
         if np.isfinite(values).all():
-            rms = statistics.bootstrap(values, statistics.root_mean_square)
+            rms = statistics.clustered_rms(values, labels)
             found[name] = rms.value
             if np.isfinite(rms.low):
                 found[f"{name}_interval"] = [rms.low, rms.high]
@@ -84,16 +86,6 @@ def _seen_by(camera: CameraModel | None, recording: Recording) -> Recording:
         return recording
     other = replace(recording, camera=camera, camera_T_target=None)
     return replace(other, camera_T_target=target_poses(other))
-
-
-def _folds(
-    recording: Recording, usable: NDArray[np.int64], rng: np.random.Generator
-) -> list[NDArray[np.int64]]:
-    """At most five sets of samples; those of one robot pose share its error and stay together."""
-    labels = standstills(recording.present.base_T_flange[usable])
-    groups = [usable[labels == label] for label in np.unique(labels)]
-    parts = np.array_split(rng.permutation(len(groups)), min(FOLDS, len(groups)))
-    return [np.concatenate([groups[i] for i in part]) for part in parts if len(part)]
 
 
 def refit_target(parent_T_camera: Array, recording: Recording) -> Array:

@@ -15,6 +15,7 @@ from hecbench import statistics
 from hecbench.estimate import Estimate, Status
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
+from hecbench.samples.standstills import folds, pose_labels
 from hecbench.se3 import Array
 from hecbench.specs import Column, EvaluatorSpec, Need, ResultSection
 
@@ -66,18 +67,20 @@ def of_left_out_views(
     usable = masked_samples(recording)
     found: list[float] = []
     failed = 0
-    folds = np.array_split(rng.permutation(usable), min(FOLDS, len(usable)))
-    for fold in folds:
+    used: list[int] = []
+    parts = folds(recording, usable, FOLDS, rng)
+    for fold in parts:
         training = [i for i in usable if i not in fold]
         fitted = solve(recording.subset(training))
         if fitted.status is not Status.OK:
             failed += 1
             continue
         found += overlaps(recording, fitted.pose, fold.tolist())
-    counts: dict[str, Any] = {"folds": len(folds), "failed_folds": failed, "samples": len(found)}
+        used += fold.tolist()
+    counts: dict[str, Any] = {"folds": len(parts), "failed_folds": failed, "samples": len(found)}
     if not found:
         return counts
-    mean = statistics.bootstrap(found, np.mean)
+    mean = statistics.cluster_bootstrap(found, pose_labels(recording, used).tolist())
     if np.isfinite(mean.low):
         counts["mask_iou_interval"] = [mean.low, mean.high]
     return counts | {"mask_iou": mean.value, "mask_iou_median": float(np.median(found))}
