@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +26,8 @@ _PIXEL_NOISE_PX = 0.3
 _SAMPLE_INTERVAL_S = 5.0
 _STAMP_JITTER_S = 0.005
 _FLIPPED_SHARE = 0.3
+
+Seed = Callable[[Recording, np.random.Generator], Recording]
 
 
 def arm_recording(robot: RobotModel, rng: np.random.Generator, samples: int = 12) -> Recording:
@@ -209,14 +212,39 @@ def mirrored_target_poses(recording: Recording, rng: np.random.Generator) -> Rec
     return replace(recording, camera_T_target=poses, corners_px=None)
 
 
+def _stamps_in(per_second: float) -> Seed:
+    """The stamps of a clock of its own, whole numbers of another unit; needs stamps."""
+
+    def seed(recording: Recording, rng: np.random.Generator) -> Recording:
+        start_s = rng.uniform(0.0, 1e4)
+        stamps: dict[str, Any] = {
+            name: np.round((np.asarray(getattr(recording, name)) + start_s) * per_second)
+            for name in ("robot_stamp_s", "camera_stamp_s")
+        }
+        return replace(recording, **stamps)
+
+    return seed
+
+
+def camera_link(recording: Recording, rng: np.random.Generator) -> Recording:
+    """Only target poses, in a frame with x forward, y left, z up; needs corners given."""
+    link_R_optical = np.array([[0.0, 0.0, 1.0], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]])
+    poses = se3.make(link_R_optical, np.zeros(3)) @ recording.present.camera_T_target
+    return replace(recording, camera_T_target=poses, corners_px=None)
+
+
 @dataclass(frozen=True)
 class Fault:
-    """What is done to a good recording, what must be named, and what the recording must have for it."""
+    """What is done to a good recording, what must be named, and what the recording must have for it.
 
-    seed: Callable[[Recording, np.random.Generator], Recording]
+    Where the answer stays right for what the data are, what is named is not `critical`.
+    """
+
+    seed: Seed
     finding: str
     needs_joints: bool = False
     needs_target_poses: bool = False
+    critical: bool = True
 
 
 FAULTS: Mapping[str, Fault] = {
@@ -236,4 +264,9 @@ FAULTS: Mapping[str, Fault] = {
     "intrinsics of another resolution": Fault(other_resolution, "intrinsics"),
     "outlier of 20 mm or 3 deg": Fault(outlier_pose, "outlier_sample"),
     "planar flips": Fault(mirrored_target_poses, "planar_ambiguity", needs_target_poses=True),
+    "stamps in ms": Fault(_stamps_in(1e3), "clock_lag", needs_joints=True),
+    "stamps in us": Fault(_stamps_in(1e6), "clock_lag", needs_joints=True),
+    "frame of the camera's housing": Fault(
+        camera_link, "camera_frame", needs_target_poses=True, critical=False
+    ),
 }

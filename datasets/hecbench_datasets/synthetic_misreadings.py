@@ -11,13 +11,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from hecbench import se3
-from hecbench.lens import EQUIDISTANT, OPENCV, CameraModel, distort
+from hecbench import preparation, se3
+from hecbench.diagnose.clock_lag import interpolated
+from hecbench.lens import EQUIDISTANT, OPENCV, CameraModel, distort, project
 from hecbench.recording import Mounting, Recording
 from hecbench.se3 import Array
 from hecbench.targets import ChessboardTarget
 from hecbench_datasets.synthetic_faults import Fault
 from hecbench_datasets.synthetic_markers import MarkerSetting, generate
+
+_FILM_STEP_S, _FILM_GAP_S = 1.5, 0.1
+"""From pose to pose, and from frame to frame, where a recording's poses become a film."""
 
 NEAR_BOARD = MarkerSetting(
     ChessboardTarget(9, 6, 0.025),
@@ -160,6 +164,33 @@ def text_order(recording: Recording, rng: np.random.Generator) -> Recording:
     return replace(recording, base_T_flange=recording.present.base_T_flange[order])
 
 
+def images_late(recording: Recording, rng: np.random.Generator) -> Recording:
+    """A film along the recording's poses, its images 0.1 to 0.3 s older than the robot poses of their stamps."""
+    truth, hand = recording.present.truth_parent_T_camera, recording.hand_poses()
+    camera_T_target = preparation.prepare(recording).present.camera_T_target
+    carrier_T_target = se3.mean(se3.inverse(hand) @ truth @ camera_T_target)
+    seconds = np.arange(len(hand), dtype=float) * _FILM_STEP_S
+    times = np.arange(seconds[0] + 0.5, seconds[-1], _FILM_GAP_S)
+    poses = interpolated(seconds, recording.present.base_T_flange, times)
+    before = interpolated(seconds, recording.present.base_T_flange, times - rng.uniform(0.1, 0.3))
+    film = Recording(
+        name=recording.name,
+        mounting=recording.mounting,
+        sample_ids=tuple(f"{i:06d}" for i in range(len(times))),
+        camera=recording.camera,
+        target=recording.target,
+        base_T_flange=poses,
+        robot_stamp_s=times,
+        camera_stamp_s=times,
+    )
+    seen = se3.inverse(truth) @ replace(film, base_T_flange=before).hand_poses() @ carrier_T_target
+    points = se3.transform_points(seen, film.present.target.points_m)
+    corners = project(film.present.camera, points) + rng.normal(
+        0.0, NEAR_BOARD.pixel_noise_px, (*points.shape[:2], 2)
+    )
+    return replace(film, corners_px=corners)
+
+
 def _rotations_replaced(recording: Recording, rotations: Array) -> Recording:
     poses = recording.present.base_T_flange.copy()
     poses[:, :3, :3] = rotations
@@ -203,6 +234,7 @@ MISREADINGS: Mapping[str, Fault] = {
     "sorted as text": Fault(text_order, "pairing"),
     "rotation vectors as angles": Fault(vectors_as_angles, "rotation_convention"),
     "quaternions shifted": Fault(quaternions_shifted, "rotation_convention"),
+    "images late, stamps equal": Fault(images_late, "clock_lag"),
     "pictures mirrored": Fault(mirrored, "mirrored_images"),
 }
 """What is done to `near_board`, and the finding that must name it."""

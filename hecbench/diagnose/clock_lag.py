@@ -24,6 +24,13 @@ _BETTER = 0.7
 _LEAST_S = 0.01
 _UNITS = {1e17: (1e9, "ns"), 1e14: (1e6, "us"), 1e11: (1e3, "ms")}
 """Smallest stamps since 1970 in each unit, and how many of it a second has."""
+_LEAST_GAPS = 4
+_LONGEST_S = 600.0
+"""No arm rests longer between two samples."""
+_CRAWL_M_S = 1e-3
+"""No arm is moved more slowly along a way that is filmed; whole numbers are asked for too."""
+_USUAL_S = {True: 0.05, False: 5.0}
+"""Between the samples of a film, and of poses of their own."""
 
 
 def examine(case: Examination) -> tuple[Finding | None, Examination]:
@@ -32,10 +39,8 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
     stamps, poses = recording.robot_stamp_s, recording.base_T_flange
     if stamps is None or poses is None or not case.can_be_fitted:
         return None, case
-    if unit := _unit(stamps):
-        summary = (
-            f"the stamps are in {unit[1]}, not in seconds: the first is {stamps[np.isfinite(stamps)][0]:.6g}"
-        )
+    if unit := _unit(stamps, poses):
+        summary = f"the stamps are in {unit[1]}, not in seconds: {unit[2]}"
         action = f"divide robot_stamp_s and camera_stamp_s by {unit[0]:g}"
         return Finding(ID, Severity.CRITICAL, summary, action, unit[0], 1.0), _in_seconds(case, unit[0])
     times, hand, seen = _stream(case, stamps)
@@ -49,9 +54,33 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
     return _confirmed(case, stamps, lag_s)
 
 
-def _unit(stamps: Array) -> tuple[float, str] | None:
-    typical = float(np.nanmedian(stamps))
-    return next((unit for least, unit in _UNITS.items() if typical > least), None)
+def _unit(stamps: Array, poses: Array) -> tuple[float, str, str] | None:
+    """How many of their unit a second has, its name and what shows it; None for stamps in seconds.
+
+    Stamps since 1970 show it by their size, those from a start of their own by how long one sample lasts.
+    """
+    known = np.isfinite(stamps) & np.isfinite(poses).all((1, 2))
+    order = np.flatnonzero(known)[np.argsort(stamps[known], kind="stable")]
+    if not len(order):
+        return None
+    for least, (per_second, name) in _UNITS.items():
+        if np.median(stamps[order]) > least:
+            return per_second, name, f"the first is {stamps[order[0]]:.6g}"
+    order = order[np.append(True, np.diff(stamps[order]) > 0)]
+    if len(order) < _LEAST_GAPS:
+        return None
+    gap, way = float(np.median(np.diff(stamps[order]))), poses[order]
+    dense = _is_dense(way)
+    crawls = dense and not np.mod(stamps[order], 1).any() and _speed_m_s(way, stamps[order]) < _CRAWL_M_S
+    if gap < _LONGEST_S and not crawls:
+        return None
+    usual_s = _USUAL_S[dense]
+    per_second, name = min(_UNITS.values(), key=lambda unit: abs(np.log(gap / unit[0] / usual_s)))
+    return per_second, name, f"one sample would last {gap:.6g} s"
+
+
+def _speed_m_s(way: Array, times: Array) -> float:
+    return float(np.median(se3.translation_error_m(way[1:], way[:-1]) / np.diff(times)))
 
 
 def _in_seconds(case: Examination, per_second: float) -> Examination:
