@@ -1,6 +1,6 @@
 """Marker methods on generated rigs: accuracy, Cramer-Rao bound, coverage, times, and the recall of `check`.
 
-Run: ``python benchmarks/bench_markers.py accuracy|coverage|times|check|misreadings [--rigs 200]``
+Run: ``python benchmarks/bench_markers.py accuracy|coverage|times|check|misreadings|good [--rigs 200]``
 (minutes each, one core).
 """
 
@@ -28,7 +28,7 @@ from hecbench.errors import HecbenchError
 from hecbench.recording import Mounting
 from hecbench.robots.model import load_robot
 from hecbench.specs import Kind, SolverSpec
-from hecbench.targets import ChessboardTarget
+from hecbench.targets import AprilTagTarget, CharucoTarget, ChessboardTarget
 from hecbench.workspace import apart_m, points_in_parent
 
 cv2.setNumThreads(1)
@@ -177,7 +177,38 @@ def misreadings(rigs):
         print(f"{name:34} {fault.finding:22} {hits} of {rigs}  besides: {dict(besides)}", flush=True)
 
 
+GOOD_TARGETS = (
+    AprilTagTarget("tag36h11", 0, 0.12),
+    ChessboardTarget(7, 5, 0.03),
+    CharucoTarget(7, 5, 0.04, 0.03, "DICT_4X4_50"),
+)
+
+
+def good(rigs):
+    """How often `check` finds something critical, or warns, where nothing is wrong: 8 to 60 samples, both mountings."""
+    critical, warned, any_critical = Counter(), Counter(), 0
+    for index in range(rigs):
+        rng = np.random.default_rng([17, index])
+        setting = replace(
+            PRESETS["tag_2m"],
+            target=GOOD_TARGETS[index % 3],
+            mounting=(Mounting.EYE_TO_HAND, Mounting.EYE_IN_HAND)[index // 3 % 2],
+            samples=int(rng.integers(8, 61)),
+            distance_m=rng.uniform(0.8, 2.0),
+            pixel_noise_px=rng.uniform(0.1, 0.4),
+            robot_noise_mm=rng.uniform(0.1, 0.8),
+            robot_noise_deg=rng.uniform(0.01, 0.08),
+        )
+        findings = check(generate(setting, rng))
+        critical.update(f.id for f in findings if f.severity is Severity.CRITICAL)
+        warned.update(f.id for f in findings if f.severity is Severity.WARNING)
+        any_critical += any(f.severity is Severity.CRITICAL for f in findings)
+    print(f"{any_critical} of {rigs} good recordings have a critical finding: {dict(critical)}")
+    print(f"warnings: {dict(warned)}", flush=True)
+
+
 CAMPAIGNS = {
+    "good": good,
     "accuracy": accuracy,
     "coverage": coverage,
     "times": times,

@@ -34,7 +34,7 @@ from hecbench.workspace import apart_m, points_in_parent
 SEED = 1000
 PRESETS = ("tag_2m", "small_tag_2m", "board_2m")
 REAL = tuple(f"real-{count}" for count in (8, 12, 20, 40))
-SEEDED = {f"fault-{name.replace(' ', '-')}": fault for name, fault in FAULTS.items()}
+SEEDED = {f"fault-{name.replace(' ', '-')}": fault for name, fault in FAULTS.items() if fault.critical}
 WRONG = (*SEEDED, "lens", "size")
 DISTORTION = np.array([-0.3, 0.1, 0.001, -0.001, 0.0])
 """Of a usual 6 mm lens, forgotten in the kind ``lens``."""
