@@ -1,6 +1,7 @@
 """LeRobot sets written here in their documented layouts, from lab pictures."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -206,3 +207,16 @@ def test_frames_are_slow_and_far_apart():
     rows = lerobot._chosen(joints, stamps)
     assert len(rows) == lerobot.FRAMES
     assert len(np.unique(joints[rows, 0])) == lerobot.FRAMES
+
+
+WRITTEN = Path(__file__).parent / "data/lerobot_writer"
+"""Two episodes of a drawn UR5e, by `LeRobotDataset.create`, `add_frame`, `save_episode` of lerobot 0.4.4 (AV1 film)."""
+
+
+def test_what_the_package_itself_writes_is_read(data):
+    drawn = recording_io.load(data / "lit_ur5e_1_00")
+    for index in range(2):
+        recording = load_recording(WRITTEN / f"episode_{index:06d}")
+        np.testing.assert_allclose(recording.joints_rad, drawn.joints_rad, atol=1e-6)
+        for i in range(len(drawn)):
+            assert np.abs(recording.image(i).astype(float) - drawn.image(i)).mean() < 4
