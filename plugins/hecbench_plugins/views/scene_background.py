@@ -102,8 +102,9 @@ def background(images: Pictures | Spool) -> tuple[Floats, Floats]:
     Raises:
         InputError: too few or too many views, or no 8-bit RGB.
     """
-    if len(images.shape) != 4 or images.shape[-1] != 3 or getattr(images, "dtype", np.uint8) != np.uint8:
-        raise InputError(f"expected 8-bit RGB pictures (N, H, W, 3), got {images.shape}")
+    dtype = np.dtype(np.uint8) if isinstance(images, Spool) else images.dtype
+    if dtype != np.uint8 or len(images.shape) != 4 or images.shape[-1] != 3:
+        raise InputError(f"expected 8-bit RGB pictures (N, H, W, 3), got {dtype} {images.shape}")
     if not FEWEST_VIEWS <= len(images) <= 255:
         raise InputError(f"{len(images)} views: a background takes {FEWEST_VIEWS} to 255 of them")
     height, width = images.shape[1:3]
