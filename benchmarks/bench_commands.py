@@ -1,8 +1,8 @@
 """What whole commands cost: wall clock, CPU time and peak memory, of this checkout and others in turn.
 
-Run: ``python benchmarks/bench_commands.py [--checkout OTHER]... [--rounds 3] [--only NAME]...``. Every checkout needs
-its `.venv`. The recordings are those of ../shared/data; the first round fills the caches and is not counted.
-``HECBENCH_NO_CACHE=1`` detects and prepares anew each time.
+Run: ``python benchmarks/bench_commands.py [--checkout OTHER]... [--rounds 3] [--only NAME]...``. All checkouts are run
+by this interpreter, each from its own packages, turn by turn. The recordings are those of ../shared/data; the first
+round fills the caches and is not counted. ``HECBENCH_NO_CACHE=1`` detects and prepares anew each time.
 """
 
 import argparse
@@ -11,6 +11,7 @@ import os
 import shutil
 import statistics
 import subprocess
+import sys
 import tempfile
 import time
 from pathlib import Path
@@ -42,8 +43,10 @@ def without_corners(folder):
 def cost(checkout, arguments):
     """Wall s, CPU s, peak MB of one command."""
     start = time.perf_counter()
+    places = [str(checkout / package) for package in ("", "plugins", "datasets", "hardware")]
     process = subprocess.Popen(
-        [checkout / ".venv/bin/hecbench", *arguments],
+        [sys.executable, "-c", "from hecbench.commands.cli import main; main()", *arguments],
+        env={**os.environ, "PYTHONPATH": os.pathsep.join(places)},
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
@@ -63,8 +66,9 @@ def main():
         places = {"data": str(DATA), "undetected": str(without_corners(Path(folder) / "undetected"))}
         for name in options.only or COMMANDS:
             arguments = [word.format(**places) for word in COMMANDS[name]]
-            for checkout in [HERE, *options.checkout]:
-                rows = [cost(checkout, arguments) for _ in range(options.rounds + 1)][1:]
+            checkouts = [HERE, *(checkout.resolve() for checkout in options.checkout)]
+            rounds = [[cost(place, arguments) for place in checkouts] for _ in range(options.rounds + 1)][1:]
+            for checkout, rows in zip(checkouts, zip(*rounds, strict=True), strict=True):
                 wall, cpu, peak = (statistics.median(column) for column in zip(*rows, strict=True))
                 print(
                     f"{name:32} {checkout.name:16} {wall:6.2f} s wall {cpu:6.2f} s CPU {peak:5.0f} MB",

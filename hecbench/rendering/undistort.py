@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
@@ -44,14 +45,28 @@ class Undistortion:
         values = np.asarray(picture, np.float32) * np.float32(scale)
         if self._source is None:
             return values
-        from scipy.ndimage import map_coordinates
+        resampled = np.empty((*self._source.shape[1:], values[0, 0].size), np.float32)
+        _resample(values.reshape(*values.shape[:2], -1), self._source, resampled)
+        return resampled.reshape(values.shape)
 
-        planes = values.reshape(*values.shape[:2], -1)
-        resampled = [
-            map_coordinates(planes[..., c], self._source, order=1, mode="constant")
-            for c in range(planes.shape[-1])
-        ]
-        return np.stack(resampled, -1).reshape(values.shape)
+
+@numba.njit(cache=True, nogil=True)
+def _resample(picture, source, out):  # type: ignore[no-untyped-def]  # noqa: ANN001, ANN202
+    """Fill `out` (H, W, C) by linear interpolation of `picture` at rows and columns `source` (2, H, W), else 0."""
+    height, width, channels = picture.shape
+    for y in range(out.shape[0]):
+        for x in range(out.shape[1]):
+            v, u = source[0, y, x], source[1, y, x]
+            if not (0 <= v <= height - 1 and 0 <= u <= width - 1):
+                for c in range(channels):
+                    out[y, x, c] = 0.0
+                continue
+            top, left = min(int(v), height - 2), min(int(u), width - 2)
+            down, across = v - top, u - left
+            for c in range(channels):
+                upper = picture[top, left, c] * (1 - across) + picture[top, left + 1, c] * across
+                lower = picture[top + 1, left, c] * (1 - across) + picture[top + 1, left + 1, c] * across
+                out[y, x, c] = upper * (1 - down) + lower * down
 
 
 def shrunk_intrinsics(K: Array, across: float, down: float | None = None) -> Array:

@@ -37,11 +37,13 @@ _MOST_FOR_BACKGROUND = 40
 """Photographs that the background is taken from: more change it little, and cost memory and the square of the time."""
 _COARSEST_PX = 400
 _BAND_PX = 20
+_ROWS_BEYOND = 4
+"""Rows of a picture read beyond the lines' reach: rounding, and the edge of the contour's last place."""
 _LEAST_SIGMA_PX = 0.7
 _SMOOTH_PX = 0.8
 _CLIP_SHARE = 0.9
 _MOST_MOVE_RAD, _MOST_MOVE_M = 0.1, 0.05
-_SETTLED = 0.1
+SETTLED = 0.1
 """Standard deviations of the answer that a move must not exceed for the refinement to have converged."""
 _DAMPING = 1e-3
 _GROUP_SHARE, _FEWEST_COUNTS = 0.3, 50.0
@@ -59,10 +61,7 @@ class Background:
     def of(images: Spool) -> Background:
         """From photographs of one fixed camera; of many, from some that are spread evenly."""
         chosen = np.unique(np.linspace(0, len(images) - 1, _MOST_FOR_BACKGROUND).round().astype(int))
-        shown = np.empty((len(chosen), *images.shape[1:]), np.uint8)
-        for place, photograph in zip(shown, images.subset(chosen.tolist()), strict=True):
-            place[:] = photograph
-        image, agreement = scene_background.background(shown)
+        image, agreement = scene_background.background(images.subset(chosen.tolist()))
         return Background(np.round(image).astype(np.uint8), agreement)
 
 
@@ -99,6 +98,7 @@ class _Buffers:
         histograms = (len(mesh.part_names), kernels.BINS**3)
         self.inside, self.around = (np.zeros(histograms, np.float32) for _ in range(2))
         self.covered = np.zeros((height, width), np.int16)
+        self.image, self.smooth = (np.zeros((height, width, 3), np.uint8) for _ in range(2))
         points = 16 * (width + height) + 32768
         self.contour, self.normal_rate = np.zeros((points, 4)), np.zeros((points, 3))
         self.parts, self.kept = np.zeros((points, 2), np.int32), np.zeros(points, np.int32)
@@ -206,7 +206,9 @@ class ContourMatcher:
             camera_T_parent,
             spacing,
             radius_m,
-            lambda buffers, view, count: self._compared(buffers, view, count, spacing, extra[view]),
+            lambda buffers, view, count, image, smooth: self._compared(
+                buffers, count, image, smooth, spacing, extra[view]
+            ),
         )
         A, b, squares, used, sharp, judged, rms = (np.array(column) for column in zip(*rows, strict=True))
         return ContourEquations(
@@ -241,7 +243,7 @@ class ContourMatcher:
         camera_T_parent: Array,
         spacing: float,
         radius_m: float,
-        compare: Callable[[_Buffers, int, int], Any] | None,
+        compare: Callable[[_Buffers, int, int, Images, Images], Any] | None,
     ) -> list[Any]:
         """Draw and compare every view; the colours that are met meanwhile become the known ones afterwards."""
         reach = int(max(_BAND_PX, HALF_LINE * spacing))
@@ -251,9 +253,11 @@ class ContourMatcher:
             buffers.inside[:], buffers.around[:], buffers.covered[:] = 0, 0, 0
             for view in range(number, len(self.canvas), len(self._buffers)):
                 count = self._draw(buffers, view, camera_T_parent, radius_m)
+                image = self._near_robot(self._images, view, buffers, buffers.image, reach)
                 if compare is not None:
-                    done.append((view, compare(buffers, view, count)))
-                self._learn(buffers, view, count, reach)
+                    smooth = self._near_robot(self._smooth, view, buffers, buffers.smooth, reach)
+                    done.append((view, compare(buffers, view, count, image, smooth)))
+                self._learn(buffers, image, count, reach)
             return done
 
         done = [row for rows in threads.each(share, range(len(self._buffers))) for row in rows]
@@ -295,8 +299,20 @@ class ContourMatcher:
             )
         )
 
-    def _learn(self, buffers: _Buffers, view: int, count: int, reach: int) -> None:
-        renderer, image = buffers.renderer, self._images[view]
+    def _near_robot(
+        self, pictures: Pictures, view: int, buffers: _Buffers, out: Images, reach: int
+    ) -> Images:
+        """A view's picture, of one in a spool only the rows within reach of the robot drawn last."""
+        if not isinstance(pictures, Spool):
+            return pictures[view]
+        _, _, top, bottom = buffers.renderer.box.tolist()
+        first, last = max(0, top - reach - _ROWS_BEYOND), min(len(out), bottom + reach + _ROWS_BEYOND)
+        if first < last:
+            pictures.read_rows(view, first, last, out)
+        return out
+
+    def _learn(self, buffers: _Buffers, image: Images, count: int, reach: int) -> None:
+        renderer = buffers.renderer
         kernels.mark_covered(renderer.face, renderer.box, buffers.covered)
         kernels.count_inside(
             renderer.face,
@@ -314,7 +330,13 @@ class ContourMatcher:
         )
 
     def _compared(
-        self, buffers: _Buffers, view: int, count: int, spacing: float, twists: Array
+        self,
+        buffers: _Buffers,
+        count: int,
+        image: Images,
+        smooth: Images,
+        spacing: float,
+        twists: Array,
     ) -> tuple[Array, Array, float, int, float, int, float]:
         A, b = np.zeros((6 + len(twists),) * 2), np.zeros(6 + len(twists))
         kernels.line_posteriors(
@@ -323,8 +345,8 @@ class ContourMatcher:
             count,
             buffers.renderer.face,
             self.mesh.face_part,
-            self._images[view],
-            self._smooth[view],
+            image,
+            smooth,
             self._valid,
             self._log_inside,
             self._log_around,
@@ -375,27 +397,34 @@ class Refined:
 
 
 def refine(
-    lines: ContourMatcher, camera_T_parent: Array, step: RefinementLevel, radius_m: float = 0.0
+    lines: ContourMatcher, camera_T_parent: Array, step: RefinementLevel, sigmas: float = SETTLED
 ) -> Refined:
-    """Damped Gauss-Newton steps of limited length at one size."""
-    pose, converged, iteration = camera_T_parent, False, 0
-    lines.learn(pose, step.spacing)
-    found = lines(pose, step.spacing, radius_m=radius_m)
+    """Damped Gauss-Newton steps of limited length at one size, until a move is `sigmas` standard deviations long."""
+    lines.learn(camera_T_parent, step.spacing)
+    found = lines(camera_T_parent, step.spacing)
+    return refine_further(lines, Refined(camera_T_parent, found, 0, False), step, 0.0, sigmas)
+
+
+def refine_further(
+    lines: ContourMatcher, start: Refined, step: RefinementLevel, radius_m: float, sigmas: float = SETTLED
+) -> Refined:
+    """The same from a comparison that was made within `radius_m` already, by the colours found there."""
+    pose, found, converged, iteration = start.camera_T_parent, start.last, False, 0
     for iteration in range(1, step.rounds + 1):  # noqa: B007 the number of the last is told
         if found.points < FEWEST_POINTS:
             break
         move = np.linalg.solve(found.A + np.diag(_DAMPING * np.diag(found.A) + 1e-9), found.b)
         pose = se3.exp(limited(move)) @ pose
         found = lines(pose, step.spacing, radius_m=radius_m)
-        converged = settled(found, move)
+        converged = settled(found, move, sigmas)
         if converged:
             break
-    return Refined(pose, found, iteration, converged)
+    return Refined(pose, found, start.iterations + iteration, converged)
 
 
-def settled(found: ContourEquations, move: NDArray[Any]) -> bool:
-    """Whether a move (6 + ...) is small against what the images can tell."""
-    return float(move @ found.A @ move) < CORRELATED_POINTS * _SETTLED**2
+def settled(found: ContourEquations, move: NDArray[Any], sigmas: float = SETTLED) -> bool:
+    """Whether a move (6 + ...) is shorter than so many standard deviations of what the images can tell."""
+    return float(move @ found.A @ move) < CORRELATED_POINTS * sigmas**2
 
 
 def limited(move: NDArray[Any]) -> Array:

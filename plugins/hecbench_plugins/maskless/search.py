@@ -23,7 +23,7 @@ from hecbench.system import threads
 from hecbench_plugins.maskless import kernels
 from hecbench_plugins.views.canvas import Canvas
 
-SEARCH_LEVEL = 8
+SEARCH_LEVEL = 16
 """Of the meshes: pictures of WIDTH_PX show no more."""
 WIDTH_PX = 144
 _COLOURS = 32

@@ -20,7 +20,7 @@ Picture = NDArray[np.float32]
 
 LEVELS = (4, 2, 1)
 """Pixels of the recording per pixel of a level, coarse to fine."""
-_COARSE_CELL_M = {8: 0.01, 4: 0.004, 2: 0.0015, 1: 0.0}
+_COARSE_CELL_M = {16: 0.02, 8: 0.01, 4: 0.004, 2: 0.0015, 1: 0.0}
 _LEAST_MASK, _MOST_MASK = 1e-3, 0.95
 _BACKGROUND_SPREAD = 0.08
 _SMALLEST_HIDING_PX, _SOFT_EDGE_PX = 9, 2
@@ -214,17 +214,19 @@ def foreground(image: Picture, where: str) -> Picture:
     Raises:
         NoMask: the border of the image is not uniform, so that only a given mask could tell the robot.
     """
-    from scipy import ndimage
+    import cv2
 
     border = np.concatenate(
         [image[:8].reshape(-1, 3), image[-8:].reshape(-1, 3), image[:, :8].reshape(-1, 3)]
     )
     background = np.median(border, 0)
-    smooth = ndimage.uniform_filter(image, (5, 5, 1))
+    smooth = cv2.blur(image, (5, 5), borderType=cv2.BORDER_REFLECT)
     off = np.abs(smooth - background).max(-1)
     rim = np.concatenate([off[:8].ravel(), off[-8:].ravel()])
     if np.percentile(rim, 90) > _BACKGROUND_SPREAD:
         raise NoMask(f"{where}: no mask, and the background is not uniform: give masks of the robot")
+    from scipy import ndimage
+
     threshold = max(0.02, 3 * float(np.median(off) + np.std(rim)))
     mask = ndimage.binary_opening(ndimage.binary_fill_holes(off > threshold), iterations=2)
     return np.asarray(mask, np.float32)
@@ -250,9 +252,9 @@ def hidden_by_others(
 
 
 def _far_from(mask: Picture) -> NDArray[np.bool_]:
-    from scipy import ndimage
+    import cv2
 
-    near = ndimage.maximum_filter(shrink(mask[..., None], 4)[..., 0], 9) > 0
+    near = cv2.dilate(shrink(mask[..., None], 4)[..., 0], np.ones((9, 9), np.uint8)) > 0
     far = np.zeros(mask.shape, bool)
     grown = np.repeat(np.repeat(near, 4, 0), 4, 1)
     far[: grown.shape[0], : grown.shape[1]] = ~grown

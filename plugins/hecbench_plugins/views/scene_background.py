@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench.errors import InputError
+from hecbench.system import threads
 from hecbench_plugins.views.spool import Spool
 
 Pictures = NDArray[np.uint8]
@@ -17,6 +18,8 @@ Floats = NDArray[np.float32]
 FEWEST_VIEWS = 3
 SAME_COLOUR = 20
 """Largest channel difference, of 255, of two sights of the same thing, exclusive."""
+_STRIP_ROWS = 32
+"""Rows of all views that are held in memory at once."""
 _BLUR_PX = 1.0
 _NOISE, _WIDTH = 6.0, 14.0
 """Channel difference that says nothing, and how much more makes a pixel foreground (1 - 1/e)."""
@@ -87,7 +90,7 @@ def _unlike(image, background, out):
                 out[y, x] = 1 - np.exp(-(((d - _NOISE) / _WIDTH) ** 2))
 
 
-def background(images: Pictures) -> tuple[Floats, Floats]:
+def background(images: Pictures | Spool) -> tuple[Floats, Floats]:
     """The scene without what moves: B (H, W, 3) in [0, 255], and `agree` (H, W), the share of the views that show it.
 
     Per pixel the mode over the views: the colour that the most views share (largest channel difference below
@@ -99,14 +102,27 @@ def background(images: Pictures) -> tuple[Floats, Floats]:
     Raises:
         InputError: too few or too many views, or no 8-bit RGB.
     """
-    if images.dtype != np.uint8 or images.ndim != 4 or images.shape[-1] != 3:
-        raise InputError(f"expected 8-bit RGB pictures (N, H, W, 3), got {images.dtype} {images.shape}")
+    dtype = np.dtype(np.uint8) if isinstance(images, Spool) else images.dtype
+    if dtype != np.uint8 or len(images.shape) != 4 or images.shape[-1] != 3:
+        raise InputError(f"expected 8-bit RGB pictures (N, H, W, 3), got {dtype} {images.shape}")
     if not FEWEST_VIEWS <= len(images) <= 255:
         raise InputError(f"{len(images)} views: a background takes {FEWEST_VIEWS} to 255 of them")
-    shape = images.shape[1:]
-    scene, agree = np.empty(shape, np.float32), np.empty(shape[:2], np.float32)
-    _mode(np.ascontiguousarray(images), SAME_COLOUR, scene, agree)
+    height, width = images.shape[1:3]
+    scene, agree = np.empty((height, width, 3), np.float32), np.empty((height, width), np.float32)
+
+    def strip(first: int) -> None:
+        last = min(first + _STRIP_ROWS, height)
+        _mode(_rows(images, first, last), SAME_COLOUR, scene[first:last], agree[first:last])
+
+    threads.each(strip, range(0, height, _STRIP_ROWS))
     return scene, agree
+
+
+def _rows(images: Pictures | Spool, first: int, last: int) -> Pictures:
+    """The rows `first` to `last`, exclusive, of all pictures."""
+    if isinstance(images, Spool):
+        return images.rows(first, last)
+    return np.ascontiguousarray(images[:, first:last])
 
 
 def foreground(images: Pictures | Spool, scene: Floats) -> Floats:

@@ -51,6 +51,19 @@ class Spool:
         self._descriptor.read(picture, self._rows[index] * self._bytes)
         return picture
 
+    def read_rows(self, index: int, first: int, last: int, out: Picture) -> None:
+        """Fill the rows `first` to `last`, exclusive, of `out` (H, W, 3) with those of a picture."""
+        row_bytes = self._bytes // self._shape[0]
+        self._descriptor.read(out[first:last], self._rows[index] * self._bytes + first * row_bytes)
+
+    def rows(self, first: int, last: int) -> Picture:
+        """The rows `first` to `last`, exclusive, of all pictures: (N, last - first, W, 3)."""
+        found = np.empty((len(self), last - first, *self._shape[1:]), np.uint8)
+        row_bytes = self._bytes // self._shape[0]
+        for row, place in zip(self._rows, found, strict=True):
+            self._descriptor.read(place, row * self._bytes + first * row_bytes)
+        return found
+
     def __iter__(self) -> Iterator[Picture]:
         return (self[index] for index in range(len(self)))
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy import ndimage
 
 from hecbench import se3
 from hecbench.errors import InputError
@@ -202,3 +203,16 @@ def test_bad_input_is_refused(arm, mesh, renderer):
         renderer.draw(np.full((11, 4, 4), np.nan))
     with pytest.raises(InputError, match="no visual meshes"):
         RenderMesh.of(load_robot("ur5e", meshes=False))
+
+
+def test_undistorted_pictures_are_resampled_as_scipy_does(rng):
+    camera = CameraModel(
+        30, 20, np.array([[25.0, 0, 14.5], [0, 25.0, 9.5], [0, 0, 1]]), np.array([0.4, 0.1, 0.01, 0.0])
+    )
+    picture = rng.random((20, 30, 3)).astype(np.float32)
+    pinhole = Undistortion.of(camera)
+    expected = [
+        ndimage.map_coordinates(picture[..., c], pinhole._source, order=1, mode="constant") for c in range(3)
+    ]
+    np.testing.assert_allclose(pinhole.image(picture), np.stack(expected, -1), atol=1e-6)
+    assert (pinhole.image(picture) == 0).any()
