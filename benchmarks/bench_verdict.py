@@ -1,16 +1,18 @@
 """The verdict against the truth it never sees: choice, interval and grade, on generated, real and faulty recordings.
 
-Run: ``python benchmarks/bench_verdict.py [--recordings 200] [--jobs 2] [KIND ...]``. Kinds: the presets of the suite
-`markers`, ``real-N`` (N samples drawn from the recording given by --real), ``fault-NAME``, ``lens`` (the distortion of
+Run: ``python benchmarks/bench_verdict.py [--recordings 200] [--seed 1000] [--keep FILE] [KIND ...]``. Kinds: the presets
+of the suite `markers`, ``real-N`` (N samples drawn from the recording given by --real), ``fault-NAME``, ``lens`` (the distortion of
 the camera forgotten) and ``size`` (K of another image size). A line for each kind: how often the recommended answer is
 within 1.5 x the best method + 0.5 mm, how often the 95 % interval holds the true error, and the grades; rates with
-their 95 % intervals. A recording costs one to four seconds of a core, all kinds at 200 hours.
+their 95 % intervals. With ``--keep`` each recording is a line of a file, and what stands there is not measured again.
+A recording costs one to four seconds of a core, all kinds at 200 hours.
 """
 
 import argparse
+import json
 import os
 from collections import Counter
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -31,7 +33,6 @@ from hecbench.statistics import wilson
 from hecbench.verdict import Grade
 from hecbench.workspace import apart_m, points_in_parent
 
-SEED = 1000
 PRESETS = ("tag_2m", "small_tag_2m", "board_2m")
 REAL = tuple(f"real-{count}" for count in (8, 12, 20, 40))
 SEEDED = {f"fault-{name.replace(' ', '-')}": fault for name, fault in FAULTS.items() if fault.critical}
@@ -51,24 +52,24 @@ class Row:
     covered: bool
 
 
-def recording_of(kind, index, real):
+def recording_of(kind, index, real, seed):
     """A recording with its truth."""
-    rng = np.random.default_rng([SEED, index])
+    rng = np.random.default_rng([seed, index])
     if kind in PRESETS:
-        return make(kind, index, SEED)
+        return make(kind, index, seed)
     if kind.startswith("real-"):
         whole = replace(preparation.load_recording(real), images=None)
         count = int(kind.removeprefix("real-"))
         return whole.subset(np.sort(rng.choice(len(whole), min(count, len(whole)), replace=False)))
     if kind == "lens":
-        good = make("board_2m", index, SEED)
+        good = make("board_2m", index, seed)
         return replace(good, corners_px=with_distortion(good), camera_T_target=None)
     if kind == "size":
-        good = make("board_2m", index, SEED)
+        good = make("board_2m", index, seed)
         K = good.camera.K * np.array([[1.5], [1.5], [1.0]])
         return replace(good, camera=replace(good.camera, K=K), camera_T_target=None)
     fault = SEEDED[kind]
-    good = arm_recording(load_robot("ur5e"), rng) if fault.needs_joints else make("board_2m", index, SEED)
+    good = arm_recording(load_robot("ur5e"), rng) if fault.needs_joints else make("board_2m", index, seed)
     good = preparation.prepare(good) if fault.needs_target_poses else good
     return fault.seed(good, rng)
 
@@ -84,9 +85,9 @@ def with_distortion(recording):
     return pixels.reshape(shape)
 
 
-def measured(kind, index, real):
+def measured(kind, index, real, seed):
     """The verdict on one recording against its truth."""
-    recording = recording_of(kind, index, real)
+    recording = recording_of(kind, index, real, seed)
     blind = recording.without_truth()
     examined = calibrating.examine(blind)
     specs = [spec for spec in planning.solvers_for((), blind) if not spec.slow]
@@ -102,7 +103,7 @@ def measured(kind, index, real):
     if found.recommended is None:
         return Row(found.grade, np.inf, min(errors_mm.values(), default=np.inf), False)
     error_mm, expected = errors_mm[found.recommended.solver], found.expected
-    covered = expected is not None and expected.low <= error_mm <= expected.high
+    covered = expected is not None and bool(expected.low <= error_mm <= expected.high)
     return Row(found.grade, error_mm, min(errors_mm.values()), covered)
 
 
@@ -112,9 +113,31 @@ def rate(flags):
     return f"{100 * found.value:.1f} % [{100 * found.low:.1f}, {100 * found.high:.1f}]"
 
 
-def campaign(kind, count, jobs, real):
-    """Measure a kind and print its line."""
-    rows = Parallel(n_jobs=jobs)(delayed(measured)(kind, index, real) for index in range(count))
+def kept_rows(keep, kind, seed):
+    """The rows of a kind and seed that a file holds, by index."""
+    lines = keep.read_text().splitlines() if keep and keep.exists() else []
+    known = [line for line in map(json.loads, lines) if (line["kind"], line["seed"]) == (kind, seed)]
+    return {line["index"]: Row(**line["row"] | {"grade": Grade(line["row"]["grade"])}) for line in known}
+
+
+def all_rows(kind, count, jobs, real, seed, keep):
+    """The rows of a kind; new ones are added to the file as they come."""
+    rows = kept_rows(keep, kind, seed)
+    missing = [index for index in range(count) if index not in rows]
+    found = Parallel(n_jobs=jobs, return_as="generator")(
+        delayed(measured)(kind, index, real, seed) for index in missing
+    )
+    for index, row in zip(missing, found, strict=True):
+        rows[index] = row
+        if keep:
+            line = {"kind": kind, "seed": seed, "index": index, "row": asdict(row)}
+            with keep.open("a") as stream:
+                stream.write(json.dumps(line, default=float) + "\n")
+    return [rows[index] for index in range(count)]
+
+
+def campaign(kind, rows):
+    """Print the line of a kind."""
     grades = Counter(str(row.grade) for row in rows)
     if kind in WRONG:
         caught = rate([row.grade in (Grade.DOUBTFUL, Grade.DO_NOT_USE) for row in rows])
@@ -136,9 +159,12 @@ if __name__ == "__main__":
     parser.add_argument("kinds", nargs="*", metavar="KIND")
     parser.add_argument("--recordings", type=int, default=200)
     parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--seed", type=int, default=1000)
+    parser.add_argument("--keep", type=Path)
     parser.add_argument(
         "--real", type=Path, default=Path(__file__).parents[2] / "shared" / "data" / "ur3e_cam1"
     )
     arguments = parser.parse_args()
     for each in arguments.kinds or (*PRESETS, *REAL, *WRONG):
-        campaign(each, arguments.recordings, arguments.jobs, arguments.real)
+        counted = (arguments.recordings, arguments.jobs, arguments.real, arguments.seed, arguments.keep)
+        campaign(each, all_rows(each, *counted))

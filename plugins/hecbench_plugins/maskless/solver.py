@@ -45,9 +45,6 @@ _OUTSIDE = 1.4
 """Radii of the ball beyond which an end is not believed."""
 _FREE_BALL, _FREE_STARTS = Ball(0.35, np.deg2rad(18)), 6
 """What the lattice of a search without a start leaves open about each of its starts, and how many are followed."""
-_HOPELESS = 1 / 3
-"""Of the share that is needed: with less after the coarsest size a descent is given up. Chosen when 26 right descents
-had been seen, on the suites `maskless_real` and `maskless_lit`, none with a share below 0.26 there."""
 _ROUGHLY = 1.0
 """Standard deviations that a move may have before it is asked whether the arm carries something."""
 _TOOL_M = 0.15
@@ -121,20 +118,10 @@ class Photographs:
         background = self.background if step.background else None
         return ContourMatcher(mesh_at(self.meshes, step.level), canvas, step.level, background)
 
-    def refined(self, camera_T_parent: Array, hopeless_share: float) -> Refined:
-        """All steps but the last from a pose of the search, on the searched views.
-
-        It ends with the coarsest size where the images confirm less than `hopeless_share` of the contour.
-        """
+    def refined(self, camera_T_parent: Array) -> Refined:
+        """All steps but the last from a pose of the search, on the searched views."""
         pose, found = camera_T_parent, None
-        steps = schedule(self.canvas.valid.shape[1])[0]
-        for step in steps:
-            if (
-                found is not None
-                and step.level < steps[0].level
-                and found.last.confirmed_share < hopeless_share
-            ):
-                break
+        for step in schedule(self.canvas.valid.shape[1])[0]:
             lines = self._searched.get(step) or self._searched.setdefault(
                 step, self.lines(step, self.search_views)
             )
@@ -197,7 +184,7 @@ class Maskless:
             score = Score(photographs.meshes[SEARCH_LEVEL], search_views, foreground, rng)
             for coarse, _ in search(score, place.start, place.ball, place.restarts, rng):
                 photographs.descents += 1
-                end = photographs.refined(se3.inverse(coarse), _HOPELESS * self.least_confirmed_share)
+                end = photographs.refined(se3.inverse(coarse))
                 away = place.ball.away(place.start, se3.inverse(end.camera_T_parent))
                 sharp = end.last.confirmed_share if max(away) < _OUTSIDE else 0.0
                 if best is None or sharp > best.confirmed_share:

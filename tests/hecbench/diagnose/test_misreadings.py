@@ -21,6 +21,7 @@ def test_silent_on_a_good_board(eye_to_hand):
     assert critical(near_board(np.random.default_rng(1), eye_to_hand=eye_to_hand)) == set()
 
 
+@pytest.mark.filterwarnings("error::RuntimeWarning")
 @pytest.mark.parametrize("name", MISREADINGS)
 def test_the_cause_is_named(name):
     fault = MISREADINGS[name]

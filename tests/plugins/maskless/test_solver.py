@@ -1,14 +1,10 @@
 """Calibration from photographs alone: right where the images allow it, a failure or refusal elsewhere."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from hecbench_datasets import maskless as suites
-from hecbench_plugins.maskless import solver
-from hecbench_plugins.maskless.align import schedule
-from hecbench_plugins.maskless.solver import Photographs
 from hecbench_plugins.solvers.render_gn import render_gn
 from hecbench_plugins.solvers.render_gn_free import render_gn_free
 
@@ -35,22 +31,6 @@ def test_a_fixed_camera_is_found_and_the_evidence_told(fixed_camera):
     assert [step[0] for step in told["path"]] == ["start", "search", "refined", "last"]
     assert estimate.renders > 1000
     assert (np.linalg.eigvalsh(estimate.covariance) > 0).all()
-
-
-@pytest.mark.parametrize(("hopeless_share", "goes_on"), [(0.0, True), (0.2, False)])
-def test_a_descent_far_from_the_contour_ends_at_the_coarsest_size(
-    fixed_camera, monkeypatch, hopeless_share, goes_on
-):
-    photographs, seen = Photographs.of(fixed_camera), []
-
-    def refine_nowhere(lines, pose, step):
-        seen.append(step.level)
-        return SimpleNamespace(camera_T_parent=pose, last=SimpleNamespace(confirmed_share=0.1))
-
-    monkeypatch.setattr(solver, "refine", refine_nowhere)
-    photographs.refined(np.eye(4), hopeless_share)
-    levels = [step.level for step in schedule(photographs.canvas.valid.shape[1])[0]]
-    assert seen == (levels if goes_on else [level for level in levels if level == levels[0]])
 
 
 def test_a_camera_in_the_hand_sees_its_own_arm(camera_in_hand):
