@@ -1,10 +1,11 @@
 """The verdict against the truth it never sees: choice, interval and grade, on generated, real and faulty recordings.
 
-Run: ``python benchmarks/bench_verdict.py [--recordings 200] [--seed 1000] [--keep FILE] [KIND ...]``. Kinds: the presets
-of the suite `markers`, ``real-N`` (N samples drawn from the recording given by --real), ``fault-NAME``, ``lens`` (the distortion of
-the camera forgotten) and ``size`` (K of another image size). A line for each kind: how often the recommended answer is
-within 1.5 x the best method + 0.5 mm, how often the 95 % interval holds the true error, and the grades; rates with
-their 95 % intervals. With ``--keep`` each recording is a line of a file, and what stands there is not measured again.
+Run: ``python benchmarks/bench_verdict.py [--recordings 200] [--seed 1000] [--keep FILE] [KIND ...]``. Kinds: the
+presets of the suite `markers`, ``real-N`` (N samples drawn from the recording given by --real), ``fault-NAME``,
+``lens`` (the distortion of the camera forgotten) and ``size`` (K of another image size). A line for each kind: how
+often the recommended answer is within 1.5 x the best method + 0.5 mm, how often the 95 % interval holds the true
+error, and the grades; rates with their 95 % intervals. With
+``--keep`` each recording is a line of a file, and what stands there is not measured again.
 A recording costs one to four seconds of a core, all kinds at 200 hours.
 """
 
