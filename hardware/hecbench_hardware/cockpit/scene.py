@@ -18,6 +18,8 @@ from hecbench.se3 import Array
 _GHOST_RGB, _SAMPLE_RGB, _CAMERA_RGB = (60, 130, 230), (20, 120, 60), (20, 120, 60)
 _GHOST_OPACITY = 0.35
 _CELL_M = 0.01
+_UNSEEN = 1e-4
+"""Change of a pose's numbers, rad or m, that no eye sees."""
 _PLANE_M = 0.5
 """How far in front of the camera its picture hangs."""
 _MARGIN = 1.1
@@ -45,11 +47,15 @@ class Scene:
             self._ghost = ShownRobot(scene, "/ghost", model, _GHOST_RGB, _GHOST_OPACITY, _CELL_M)
             self._ghost.hide()
         self._picture: Any = None
+        self._shown: Array | None = None
         server.initial_camera.position = (1.8, 1.2, 1.2)
         server.initial_camera.look_at = (0.0, 0.0, 0.4)
 
     def show_robot(self, joints_rad: Array, base_T_flange: Array) -> None:
-        """As it stands: joints (6,) rad, NaN where they are not known."""
+        """As it stands: joints (6,) rad, NaN where they are not known; a browser draws again only what has moved."""
+        if self._shown is not None and np.abs(base_T_flange - self._shown).max() < _UNSEEN:
+            return
+        self._shown = base_T_flange
         place(self._flange, base_T_flange)
         if self._robot is not None and np.isfinite(joints_rad).all():
             self._robot.place(self._links(joints_rad, base_T_flange))
