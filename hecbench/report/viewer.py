@@ -222,6 +222,6 @@ def open_server(host: str, port: int) -> Any:
     try:
         import viser
     except ImportError:
-        raise InputError("view needs viser: pip install 'hecbench[viewer]'") from None
+        raise InputError("the 3D page needs viser: pip install 'hecbench[viewer]'") from None
     with stdout_to_stderr():  # it greets
         return viser.ViserServer(host=host, port=port, verbose=False)
