@@ -76,6 +76,12 @@ class CameraModel:
             raise InputError(f"camera.distortion: {len(distortion)} numbers; give {lengths} finite ones")
         object.__setattr__(self, "distortion", distortion)
 
+    @staticmethod
+    def centred(width: int, height: int, focal_px: float) -> CameraModel:
+        """Without distortion, the principal point in the middle of the image."""
+        K = np.array([[focal_px, 0, (width - 1) / 2], [0, focal_px, (height - 1) / 2], [0, 0, 1]])
+        return CameraModel(width, height, K)
+
     @property
     def intrinsics(self) -> Array:
         """K (3, 3) px.

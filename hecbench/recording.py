@@ -201,9 +201,7 @@ class Recording:
         """
         if self.base_T_flange is None:
             raise Refusal("no sample has base_T_flange, and the robot model that would give it is unknown")
-        return (
-            self.base_T_flange if self.mounting is Mounting.EYE_TO_HAND else se3.inverse(self.base_T_flange)
-        )
+        return hand_poses(self.mounting, self.base_T_flange)
 
     @property
     def present(self) -> Present:
@@ -333,6 +331,11 @@ _PER_SAMPLE_ARRAYS = (
     "robot_stamp_s",
     "camera_stamp_s",
 )
+
+
+def hand_poses(mounting: Mounting, base_T_flange: Array) -> Array:
+    """H (..., 4, 4) m of `Recording.hand_poses` for flange poses (..., 4, 4), and back."""
+    return base_T_flange if mounting is Mounting.EYE_TO_HAND else se3.inverse(base_T_flange)
 
 
 def _rigid(poses: Array, name: str) -> Array:

@@ -76,10 +76,10 @@ def cluster_bootstrap(values: ArrayLike, clusters: Sequence[Hashable], seed: int
     Whole clusters are resampled (Davison and Hinkley 1997, section 3.8). The order of the values does not matter; the
     ends are NaN for fewer than five clusters.
     """
-    from scipy import stats
-
     if len(set(clusters)) == len(clusters):
         return bootstrap(values, seed=seed)
+    from scipy import stats
+
     values = np.asarray(values, float)
     _, labels = np.unique(np.array([repr(cluster) for cluster in clusters]), return_inverse=True)
     order = np.lexsort((values, labels))

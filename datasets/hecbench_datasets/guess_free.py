@@ -93,7 +93,7 @@ def share_in_view(wide: object, camera_T_base: Array, joints_rad: Array) -> floa
 
 
 def _intrinsics(width: int, height: int) -> Array:
-    return np.array([[FOCAL_PX, 0, (width - 1) / 2], [0, FOCAL_PX, (height - 1) / 2], [0, 0, 1]])
+    return CameraModel.centred(width, height, FOCAL_PX).intrinsics
 
 
 def working_joints(rng: np.random.Generator) -> Array:

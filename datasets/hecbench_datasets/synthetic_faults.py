@@ -40,7 +40,6 @@ def arm_recording(robot: RobotModel, rng: np.random.Generator, samples: int = 12
     base_T_target = base_T_flange @ carrier_T_target
     facing = base_T_target[0, :3, :3] @ se3.so3_exp(rng.uniform(-0.3, 0.3, 3))
     base_T_camera = se3.make(facing, base_T_target[:, :3, 3].mean(0) - _DISTANCE_M * facing[:, 2])
-    K = np.array([[_FOCAL_PX, 0, (_WIDTH - 1) / 2], [0, _FOCAL_PX, (_HEIGHT - 1) / 2], [0, 0, 1]])
     noise = se3.from_rotvec(
         np.deg2rad(rng.normal(0.0, 0.05, (samples, 3))), rng.normal(0.0, 5e-4, (samples, 3))
     )
@@ -50,7 +49,7 @@ def arm_recording(robot: RobotModel, rng: np.random.Generator, samples: int = 12
         mounting=Mounting.EYE_TO_HAND,
         sample_ids=tuple(f"{i:06d}" for i in range(samples)),
         robot=RobotDescription(model=robot.name, base_link="base", flange_link="tool0"),
-        camera=CameraModel(_WIDTH, _HEIGHT, K),
+        camera=CameraModel.centred(_WIDTH, _HEIGHT, _FOCAL_PX),
         target=_TARGET,
         truth_parent_T_camera=base_T_camera,
         base_T_flange=base_T_flange @ noise,

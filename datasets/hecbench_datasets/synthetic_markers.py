@@ -86,8 +86,8 @@ def make(level: str, index: int, seed: int) -> Recording:
 
 def generate(setting: MarkerSetting, rng: np.random.Generator, name: str = "synthetic") -> Recording:
     """A recording of this setting; see the module's docstring."""
-    centre = [(setting.width - 1) / 2, (setting.height - 1) / 2]
-    K = np.array([[setting.focal_px, 0, centre[0]], [0, setting.focal_px, centre[1]], [0, 0, 1]])
+    camera = CameraModel.centred(setting.width, setting.height, setting.focal_px)
+    centre = camera.intrinsics[:2, 2]
     eye_to_hand = setting.mounting is Mounting.EYE_TO_HAND
     if eye_to_hand:
         parent_T_camera = _camera_looking_at_workspace(setting.distance_m, rng)
@@ -115,7 +115,7 @@ def generate(setting: MarkerSetting, rng: np.random.Generator, name: str = "synt
         name=name,
         mounting=setting.mounting,
         sample_ids=tuple(f"{i:06d}" for i in range(setting.samples)),
-        camera=CameraModel(setting.width, setting.height, K),
+        camera=camera,
         target=setting.target,
         truth_parent_T_camera=parent_T_camera,
         base_T_flange=base_T_flange @ robot_noise,

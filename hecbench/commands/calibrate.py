@@ -28,13 +28,7 @@ EXIT_CODES = {"good": 0, "usable": 0, "doubtful": 1, "do_not_use": 3}
 @click.argument("recording", type=choices.ANY_PATH)
 @choices.solvers
 @choices.segmenter
-@click.option(
-    "--tolerance-mm",
-    type=click.FloatRange(min=0, min_open=True),
-    default=5.0,
-    show_default=True,
-    help="The error in the workspace that you can live with; the grade is relative to it.",
-)
+@choices.tolerance
 @click.option(
     "--at", metavar="X,Y,Z", help="A place, metres in the parent's frame, where the error is wanted too."
 )

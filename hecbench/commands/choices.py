@@ -69,6 +69,13 @@ timeout = click.option(
     metavar="S",
     help="Seconds that a solver may take each time it is called; default: no limit.",
 )
+tolerance = click.option(
+    "--tolerance-mm",
+    type=click.FloatRange(min=0, min_open=True),
+    default=5.0,
+    show_default=True,
+    help="The error in the workspace that you can live with; the grade is relative to it.",
+)
 memory = click.option(
     "--memory",
     "memory_mb",

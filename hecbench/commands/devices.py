@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 from hecbench.errors import InputError
 
 if TYPE_CHECKING:
+    from contextlib import ExitStack
+
     from hecbench.specs import Kind
 
 
@@ -33,3 +35,18 @@ def open_device(kind: Kind, name: str, options: Mapping[str, str]) -> Any:
         if option not in spec.options:
             raise InputError(f"{kind} '{name}' has no option {option}: it takes {', '.join(spec.options)}")
     return spec.open(options)
+
+
+def open_robot_and_camera(
+    opened: ExitStack, robot: str, camera: str, given: Mapping[str, Mapping[str, str]]
+) -> tuple[Any, Any]:
+    """Open both until `opened` is closed; a camera that draws its pictures is shown the robot."""
+    from hecbench.specs import Kind
+
+    arm = open_device(Kind.ROBOT, robot, given["robot"])
+    opened.callback(arm.close)
+    eye = open_device(Kind.CAMERA, camera, given["camera"])
+    opened.callback(eye.close)
+    if hasattr(eye, "follow"):
+        eye.follow(arm)
+    return arm, eye

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 from hecbench import se3
 from hecbench.bundle.adjustment import DescentSettings, adjust
 from hecbench.bundle.model import Noise, Problem, State, linearise
-from hecbench.diagnose.fit import EXPLAINS, TYPICAL_NOISE, Fit, IdealCamera, hand_poses
+from hecbench.diagnose.fit import EXPLAINS, TYPICAL_NOISE, Fit, IdealCamera
 from hecbench.errors import SolverFailure
-from hecbench.recording import Mounting
+from hecbench.recording import Mounting, hand_poses
 from hecbench.se3 import Array
 
 _ASSUMED_FOCAL_PX = 1000.0

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from hecbench import se3
 from hecbench.bundle.adjustment import Solution, adjust
 from hecbench.bundle.model import Noise, Problem, State, predict
-from hecbench.recording import Mounting
+from hecbench.recording import Mounting, hand_poses
 from hecbench.samples.agreement import share_left
 from hecbench.se3 import Array
 
@@ -189,8 +189,3 @@ class IdealCamera:
         by_point[:, 0, 0] = by_point[:, 1, 1] = self.focal_px / depth[:, 0]
         by_point[:, :, 2] = -pixels / depth
         return pixels, by_point, np.zeros((len(points_c), 2, 0))
-
-
-def hand_poses(mounting: Mounting, base_T_flange: Array) -> Array:
-    """H (N, 4, 4) m of `Recording.hand_poses`."""
-    return base_T_flange if mounting is Mounting.EYE_TO_HAND else se3.inverse(base_T_flange)

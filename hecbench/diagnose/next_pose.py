@@ -12,9 +12,8 @@ from hecbench import se3
 from hecbench.bundle.model import predict
 from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity
-from hecbench.diagnose.fit import hand_poses
 from hecbench.diagnose.precision import Precision, information_of, precision
-from hecbench.recording import CameraModel
+from hecbench.recording import CameraModel, hand_poses
 from hecbench.se3 import Array
 
 ID = "next_pose"

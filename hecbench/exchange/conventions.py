@@ -13,7 +13,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.exchange.pose_numbers import Reading
 from hecbench.exchange.stillness import (
@@ -23,7 +22,7 @@ from hecbench.exchange.stillness import (
     stillness,
     turns_about_one_axis,
 )
-from hecbench.recording import Mounting
+from hecbench.recording import Mounting, hand_poses
 from hecbench.samples import agreement
 from hecbench.se3 import Array
 
@@ -87,7 +86,7 @@ class _Candidate:
 
     @property
     def hand_poses(self) -> Array:
-        return _hand(self.mounting, self.robot.poses)
+        return hand_poses(self.mounting, self.robot.poses)
 
     def reads_as(self, other: _Candidate) -> bool:
         """Whether both are the same poses under two names."""
@@ -258,7 +257,8 @@ def _candidates(
     """Combinations worth fitting: those whose rotations agree, and the one that is documented."""
     hands = [(mounting, reading) for reading in robot for mounting in (mountings if told else Mounting)]
     misfits = rotation_misfits(
-        [_hand(mounting, reading.poses) for mounting, reading in hands], [reading.poses for reading in target]
+        [hand_poses(mounting, reading.poses) for mounting, reading in hands],
+        [reading.poses for reading in target],
     )
     best = np.sort(misfits, axis=None)[:_MOST_EXAMINED]
     limit = max(best[-1], min(_CLEARLY_WORSE * best[0], _STILL) + _ROTATION_SLACK)
@@ -268,9 +268,5 @@ def _candidates(
     too_few = len(robot[0].poses) < _LEAST_SAMPLES
     for i, j in np.argwhere((misfits <= limit) | (documented & (too_few | (documented.sum() == 1)))):
         mounting, reading = hands[i]
-        still = stillness(_hand(mounting, reading.poses), target[j].poses)
+        still = stillness(hand_poses(mounting, reading.poses), target[j].poses)
         yield _Candidate(mounting, reading, target[j], int(departures[i, j]), still)
-
-
-def _hand(mounting: Mounting, base_T_flange: Array) -> Array:
-    return base_T_flange if mounting is Mounting.EYE_TO_HAND else se3.inverse(base_T_flange)

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from hecbench import se3
 from hecbench.errors import HecbenchError, InputError
 from hecbench.estimate import Estimate
+from hecbench.lens import CameraModel
 from hecbench.recording import Mounting, Recording
 from hecbench.rendering import RenderMesh
 from hecbench.robots.model import RobotModel
@@ -131,7 +132,7 @@ class Stage:
         if camera is not None:
             aspect = camera.width / camera.height
         if camera is not None and camera.K is not None:
-            fov = 2 * float(np.arctan(camera.height / 2 / camera.K[1, 1]))
+            fov = vertical_view_rad(camera)
         frustum = self.server.scene.add_camera_frustum(
             f"/cameras/{estimate.solver}",
             fov,
@@ -181,9 +182,8 @@ class Stage:
         target, placed = self.recording.target, self.estimates[0].carrier_T_target
         if target is None or placed is None:
             return
-        points = se3.transform_points(base_T_carrier @ placed, target.points_m).astype(np.float32)
-        colours = np.tile(np.array(_TARGET_RGB, np.uint8), (len(points), 1))
-        self.server.scene.add_point_cloud("/target", points, colours, point_size=0.004)
+        points = se3.transform_points(base_T_carrier @ placed, target.points_m)
+        add_dots(self.server.scene, "/target", points, _TARGET_RGB, 0.004)
 
     def _photograph(self, sample: int) -> NDArray[np.uint8] | None:
         if self.recording.images is None or self.recording.images[sample] is None:
@@ -204,13 +204,23 @@ class Stage:
 
     def close(self) -> None:
         """End the server."""
-        with stdout_to_stderr():
-            self.server.stop()
+        close_server(self.server)
 
 
 def place(handle: Any, base_T_thing: Array) -> None:
     """Put something of a scene at a pose (4, 4) m."""
     handle.wxyz, handle.position = se3.to_quat_wxyz(base_T_thing), base_T_thing[:3, 3]
+
+
+def add_dots(scene: Any, name: str, points_m: Array, colour: tuple[int, int, int], size_m: float) -> None:
+    """Points (N, 3) of a scene, all in one colour."""
+    colours = np.tile(np.array(colour, np.uint8), (len(points_m), 1))
+    scene.add_point_cloud(name, points_m.astype(np.float32), colours, point_size=size_m)
+
+
+def vertical_view_rad(camera: CameraModel, margin: float = 1.0) -> float:
+    """The vertical angle of view of `margin` times the height of a camera's image."""
+    return 2 * float(np.arctan(margin * camera.height / 2 / camera.intrinsics[1, 1]))
 
 
 def open_server(host: str, port: int) -> Any:
@@ -225,3 +235,9 @@ def open_server(host: str, port: int) -> Any:
         raise InputError("the 3D page needs viser: pip install 'hecbench[viewer]'") from None
     with stdout_to_stderr():  # it greets
         return viser.ViserServer(host=host, port=port, verbose=False)
+
+
+def close_server(server: Any) -> None:
+    """End a viser server."""
+    with stdout_to_stderr():  # it says so
+        server.stop()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from threading import Event
-from typing import Any
+from typing import Any, TypeVar
 
 from hecbench import registry
 from hecbench.errors import HecbenchError
@@ -13,6 +13,8 @@ from hecbench.specs import DeviceSpec, Kind
 from hecbench_hardware.cockpit import texts
 
 _TICK_S = 0.2
+
+T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -24,8 +26,8 @@ class Devices:
     host: str | None = None
 
 
-def ask(server: Any, suggested: Devices, simulated_only: bool, use: Callable[[Devices], None]) -> None:
-    """Let the person choose until `use` succeeds with what was chosen; its errors are shown."""
+def ask(server: Any, suggested: Devices, simulated_only: bool, use: Callable[[Devices], T]) -> T:
+    """What `use` makes of what the person chose; its errors are shown, and another choice can be made."""
     gui, clicked = server.gui, Event()
     folder = gui.add_folder("cell")
     with folder:
@@ -41,12 +43,12 @@ def ask(server: Any, suggested: Devices, simulated_only: bool, use: Callable[[De
         clicked.clear()
         said.content = "connecting"
         try:
-            use(Devices(robot.value, camera.value, host.value or None))
+            used = use(Devices(robot.value, camera.value, host.value or None))
         except HecbenchError as error:
             said.content = texts.fault(error)
         else:
             folder.remove()
-            return
+            return used
 
 
 def _names(kind: Kind, simulated_only: bool) -> list[str]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from hecbench.commands import choices
-from hecbench.commands.devices import device_settings, open_device
+from hecbench.commands.devices import device_settings, open_robot_and_camera
 from hecbench.errors import InputError
 
 if TYPE_CHECKING:
@@ -44,13 +44,7 @@ _TICK_S, _REST_S = 0.2, 0.05
 @click.option(
     "--frames", type=click.IntRange(min=1), default=1, show_default=True, help="Averaged per sample."
 )
-@click.option(
-    "--tolerance-mm",
-    type=click.FloatRange(min=0, min_open=True),
-    default=5.0,
-    show_default=True,
-    help="The error in the workspace that you can live with; the grade is relative to it.",
-)
+@choices.tolerance
 @click.option("--port", type=click.IntRange(0, 65535), default=8080, show_default=True)
 @choices.threads
 def cockpit(
@@ -92,25 +86,25 @@ def cockpit(
         given["robot"]["limits"] = str(limits)
     with ExitStack() as opened:
         server = viewer.open_server(_HOST, port)
-        opened.callback(server.stop)
+        opened.callback(viewer.close_server, server)
         click.echo(f"http://{_HOST}:{server.get_port()} (end with Ctrl-C)")
-        sessions: list[Session] = []
 
-        def use(chosen: Devices) -> None:
+        def use(chosen: Devices) -> Session:
             with ExitStack() as trying:
                 device, eye = _open(trying, chosen, given)
                 _take_control(trying, device, arm, freedrive)
                 known = described or _lab_cell(given["camera"], eye)
                 driven = device.enabled and not freedrive
-                sessions.append(Session(known, device, eye, out or Path("out/cockpit"), frames, driven))
+                session = Session(known, device, eye, out or Path("out/cockpit"), frames, driven)
                 opened.enter_context(trying.pop_all())
+                return session
 
         suggested = Devices(robot or _SIMULATED, camera or _SIMULATED, host)
         if robot is None and camera is None:
-            ask(server, suggested, simulated_only=cell is None, use=use)
+            session = ask(server, suggested, simulated_only=cell is None, use=use)
         else:
-            use(suggested)
-        page = Page(server, sessions[0], tolerance_mm, partial(finish, tolerance_mm))
+            session = use(suggested)
+        page = Page(server, session, tolerance_mm, partial(finish, tolerance_mm))
         opened.callback(page.close)
         while True:
             began = time.monotonic()
@@ -119,20 +113,12 @@ def cockpit(
 
 
 def _open(opened: ExitStack, chosen: Devices, given: dict[str, dict[str, str]]) -> tuple[Robot, Camera]:
-    """The devices, the camera showing the robot when it draws its pictures."""
-    from hecbench.specs import Kind
-    from hecbench_hardware.devices import FollowsRobot
-
+    """The devices; those of the lab with a table and a picture of moderate size."""
     host = {"host": chosen.host} if chosen.host else {}
     table = {"floor": "0"} if chosen.robot == _SIMULATED else {}
-    device: Robot = open_device(Kind.ROBOT, chosen.robot, table | given["robot"] | host)
-    opened.callback(device.close)
     drawn = _LAB_PICTURE if chosen.camera == _SIMULATED else {}
-    eye: Camera = open_device(Kind.CAMERA, chosen.camera, drawn | given["camera"])
-    opened.callback(eye.close)
-    if isinstance(eye, FollowsRobot):
-        eye.follow(device)
-    return device, eye
+    options = {"robot": table | given["robot"] | host, "camera": drawn | given["camera"]}
+    return open_robot_and_camera(opened, chosen.robot, chosen.camera, options)
 
 
 def _take_control(opened: ExitStack, robot: Robot, armed: bool, freedrive: bool) -> None:
@@ -151,11 +137,12 @@ def _take_control(opened: ExitStack, robot: Robot, armed: bool, freedrive: bool)
 def _lab_cell(options: dict[str, str], eye: Camera) -> Recording:
     """The lab's arm with its tag, as a person would describe it."""
     from hecbench_hardware.lab import cells, recordings
+    from hecbench_hardware.options import number
 
     station = cells.station(options.get("arm", "ur5e"), options.get("urdf"))
     camera = eye.intrinsics()
     assert camera is not None
-    return recordings.cell(station, int(options.get("calibration", 0)), camera)
+    return recordings.cell(station, int(number(options, "calibration", 0)), camera)
 
 
 def finish(tolerance_mm: float, session: Session) -> Verdict:

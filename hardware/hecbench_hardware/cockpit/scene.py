@@ -11,7 +11,7 @@ from hecbench import se3
 from hecbench.errors import HecbenchError
 from hecbench.lens import CameraModel
 from hecbench.recording import Mounting, Recording
-from hecbench.report.viewer import ShownRobot, place
+from hecbench.report.viewer import ShownRobot, add_dots, place, vertical_view_rad
 from hecbench.robots.posed import PosedRobot
 from hecbench.se3 import Array
 
@@ -80,16 +80,14 @@ class Scene:
         if not len(base_T_flange):
             self._server.scene.remove_by_name("/samples")
             return
-        points = base_T_flange[:, :3, 3].astype(np.float32)
-        colours = np.tile(np.array(_SAMPLE_RGB, np.uint8), (len(points), 1))
-        self._server.scene.add_point_cloud("/samples", points, colours, point_size=0.012)
+        add_dots(self._server.scene, "/samples", base_T_flange[:, :3, 3], _SAMPLE_RGB, 0.012)
 
     def show_camera(self, base_T_camera: Array, camera: CameraModel, image: NDArray[np.uint8]) -> Any:
         """The camera with its picture in front of it; returns the picture, which can be clicked."""
         width, height, centre = _plane(camera)
         self._server.scene.add_camera_frustum(
             "/camera",
-            2 * float(np.arctan(height / 2 / _PLANE_M)),
+            vertical_view_rad(camera),
             width / height,
             scale=0.12,
             color=_CAMERA_RGB,
@@ -105,10 +103,10 @@ class Scene:
 
     def look_through(self, base_T_camera: Array, camera: CameraModel) -> None:
         """Every browser looks through the camera at its picture."""
-        _, height, centre = _plane(camera)
+        _, _, centre = _plane(camera)
         for client in self._server.get_clients().values():
             with client.atomic():
-                client.camera.fov = 2 * float(np.arctan(_MARGIN * height / 2 / _PLANE_M))
+                client.camera.fov = vertical_view_rad(camera, _MARGIN)
                 client.camera.up_direction = -base_T_camera[:3, 1]
                 client.camera.position = base_T_camera[:3, 3]
                 client.camera.look_at = se3.transform_points(base_T_camera, centre)[0]

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench import next_view, se3
-from hecbench.recording import Mounting, Recording
+from hecbench.errors import InputError
+from hecbench.recording import Mounting, Recording, hand_poses
 from hecbench.se3 import Array
 from hecbench_hardware.kinematics import JOINT_NAMES, Arm
 from hecbench_hardware.limits import Limits
@@ -17,7 +18,7 @@ from hecbench_hardware.recorder import poses
 _VIEW = poses.View(nearest=0.75, furthest=1.15, tilt_rad=0.5, roll_rad=0.6)
 """Of the target, from where hands and wrists reach without a detour."""
 _CAREFUL = poses.View(nearest=0.85, furthest=1.1, tilt_rad=0.4, roll_rad=0.5)
-_MARGIN, _ROUGH_MARGIN = 0.05, 0.2
+_ROUGH_MARGIN = 0.2
 """Of the picture, kept clear at each edge."""
 _DIFFERENT = 0.6
 """Of the largest difference from all samples that is possible: enough of it, at a short way."""
@@ -73,10 +74,10 @@ def of_target(
         rough: the calibration is a guess by eye: smaller steps, well inside the picture.
     """
     wanted = poses.candidates(seen[1], _CAREFUL if rough else _VIEW, rng)
-    margin = _ROUGH_MARGIN if rough else _MARGIN
+    margin = _ROUGH_MARGIN if rough else poses.MARGIN
     wanted = wanted[poses.in_view(wanted, cell.present.camera, cell.present.target.points_m, margin)]
-    carrier_T_target = se3.inverse(_hand(cell.mounting, seen[0])) @ parent_T_camera @ seen[1]
-    flange = _hand(cell.mounting, parent_T_camera @ wanted @ se3.inverse(carrier_T_target))
+    carrier_T_target = se3.inverse(hand_poses(cell.mounting, seen[0])) @ parent_T_camera @ seen[1]
+    flange = hand_poses(cell.mounting, parent_T_camera @ wanted @ se3.inverse(carrier_T_target))
     apart = np.min([poses.apart(flange, pose) for pose in taken], axis=0)
     free = _clear_of_walls(cell, parent_T_camera @ wanted, reach)
     different = np.flatnonzero(free & (apart >= _DIFFERENT * apart[free].max(initial=0.0)))
@@ -106,35 +107,28 @@ def of_robot(
     rng: np.random.Generator,
 ) -> Suggestion | None:
     """The joints near those recorded (N, 6) whose view tells most beside them (D-optimal); None: there are none."""
-    free = _free_around(taken_rad[0], reach, rng)
     known = next_view.prior_information()
     for joints in taken_rad:
         known = known + view.look(joints, parent_T_camera).information
-    seen = [joints for joints in free if next_view.Visible()(view.look(joints, parent_T_camera))]
-    if not seen:
+    free = _around(taken_rad[0], reach, rng)
+    try:
+        chosen = next_view.most_informative(view, parent_T_camera, np.array(free).reshape(-1, 6), known)
+    except InputError:  # none of them shows enough of the robot
         return None
-    return Suggestion(
-        next_view.most_informative(view, parent_T_camera, np.array(seen), known).joints_rad[0], None
-    )
+    return Suggestion(chosen.joints_rad[0], None)
 
 
 def unlike(taken_rad: Array, reach: Reach, rng: np.random.Generator) -> Suggestion | None:
     """The joints near those recorded (N, 6) that differ most from them, where nothing is known of the camera."""
-    free = _free_around(taken_rad[0], reach, rng)
+    free = _around(taken_rad[0], reach, rng)
     if not free:
         return None
     apart = np.abs(np.array(free)[:, None] - taken_rad).max(-1).min(1)
     return Suggestion(free[int(apart.argmax())], None)
 
 
-def _free_around(centre_rad: Array, reach: Reach, rng: np.random.Generator) -> list[Array]:
-    drawn = centre_rad + rng.uniform(-1, 1, (_LOOKS, 6)) * poses.WANDER_RAD
-    return [joints for joints in drawn if poses.free_path(reach.arm, reach.here_rad, joints, reach.limits)]
-
-
-def _hand(mounting: Mounting, base_T_flange: Array) -> Array:
-    """The pose that carries the target, and back."""
-    return base_T_flange if mounting is Mounting.EYE_TO_HAND else np.asarray(se3.inverse(base_T_flange))
+def _around(centre_rad: Array, reach: Reach, rng: np.random.Generator) -> list[Array]:
+    return poses.free_around(centre_rad, _LOOKS, reach.arm, reach.here_rad, reach.limits, rng)
 
 
 def target_words(now: Array | None, wanted: Array) -> str:

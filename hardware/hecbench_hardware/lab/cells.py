@@ -152,8 +152,7 @@ class Station:
 def camera_model(width: int = _WIDTH, height: int = _HEIGHT, focal_px: float | None = None) -> CameraModel:
     """The camera of the paper, or one of another size with the same field of view."""
     focal = _FOCAL_PX * width / _WIDTH if focal_px is None else focal_px
-    K = np.array([[focal, 0, (width - 1) / 2], [0, focal, (height - 1) / 2], [0, 0, 1]])
-    return CameraModel(width, height, K)
+    return CameraModel.centred(width, height, focal)
 
 
 def looking_at(eye_m: Array, target_m: Array) -> Array:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from hecbench import next_view, se3
 from hecbench.errors import InputError
-from hecbench.recording import CameraModel, Mounting, Recording
+from hecbench.recording import CameraModel, Recording, hand_poses
 from hecbench.se3 import Array
 from hecbench_hardware.clearance import check_motion, check_pose
 from hecbench_hardware.kinematics import Arm
@@ -25,12 +25,12 @@ from hecbench_hardware.motions import JointMotion, six_joints
 _CANDIDATES = 3000
 _METRES_PER_RADIAN = 0.5
 """How far apart in position counts as much as one radian of rotation when poses are compared."""
-_MARGIN = 0.05
+MARGIN = 0.05
 """Share of the image at each edge that the target keeps clear of."""
 
 
 _LOOKS = 300
-WANDER_RAD = np.array([1.5, 0.6, 0.6, 1.2, 1.2, 3.0])
+_WANDER_RAD = np.array([1.5, 0.6, 0.6, 1.2, 1.2, 3.0])
 """How far candidates for views of the robot go from the first sample's joints."""
 
 
@@ -84,8 +84,7 @@ def diverse_plan(
     poses = candidates(seen, view or View(), rng)
     poses = poses[in_view(poses, camera, target.points_m)]
     hand = parent_T_camera @ poses @ se3.inverse(carrier_T_target)
-    base_T_flange = hand if cell.mounting is Mounting.EYE_TO_HAND else se3.inverse(hand)
-    joints = reachable(base_T_flange, arm, start, limits)
+    joints = reachable(hand_poses(cell.mounting, hand), arm, start, limits)
     chosen = [start]
     for pick in _spread(arm.forward(joints), arm.forward(start), len(joints)):
         if len(chosen) == count:
@@ -105,7 +104,7 @@ def informative_plan(
 ) -> Recording:
     """A plan of `count` poses in which the robot itself tells most about the camera, for cells without a target.
 
-    Candidates are joints drawn evenly around the first sample's, no further than `WANDER_RAD`: self-collision is not
+    Candidates are joints drawn evenly around the first sample's, no further than `_WANDER_RAD`: self-collision is not
     modelled, and an arm that is folded as at the start stays clear of itself.
 
     Args:
@@ -132,8 +131,7 @@ def informative_plan(
                 f"{cell.name}: planning views of the robot needs {name}, roughly; add it to the cell"
             )
     view, start = next_view.RobotView(cell), six_joints(cell.present.joints_rad[0])
-    drawn = start + rng.uniform(-1, 1, (_LOOKS, 6)) * WANDER_RAD
-    free = [joints for joints in drawn if free_path(arm, start, joints, limits)]
+    free = free_around(start, _LOOKS, arm, start, limits, rng)
     if len(free) < count:
         raise InputError(
             f"{cell.name}: only {len(free)} of {count} poses can be reached within the limits: ask for fewer, widen"
@@ -171,6 +169,14 @@ def _toured(cell: Recording, chosen: Array, arm: Arm, limits: Limits, count: int
     )
 
 
+def free_around(
+    centre: Array, count: int, arm: Arm, here: Array, limits: Limits, rng: np.random.Generator
+) -> list[Array]:
+    """Of `count` joints (6,) drawn evenly around some, those to which the arm can move freely from where it is."""
+    drawn = centre + rng.uniform(-1, 1, (count, 6)) * _WANDER_RAD
+    return [joints for joints in drawn if free_path(arm, here, joints, limits)]
+
+
 def _seed(cell: Recording, arm: Arm) -> tuple[Array, Array, Array, Array]:
     """camera_T_target, parent_T_camera, carrier_T_target (4, 4) and joints (6,) of the first sample."""
     present = cell.present
@@ -185,8 +191,7 @@ def _seed(cell: Recording, arm: Arm) -> tuple[Array, Array, Array, Array]:
         if value is None:
             raise InputError(f"{cell.name}: planning poses needs {name}, roughly; add it to the cell")
     start, seen = six_joints(present.joints_rad[0]), present.camera_T_target[0]
-    base_T_flange = arm.forward(start)
-    hand = base_T_flange if cell.mounting is Mounting.EYE_TO_HAND else se3.inverse(base_T_flange)
+    hand = hand_poses(cell.mounting, arm.forward(start))
     return (
         seen,
         present.initial_parent_T_camera,
@@ -218,7 +223,7 @@ def _faced(camera_R_target: Array) -> Array:
 
 
 def in_view(
-    camera_T_target: Array, camera: CameraModel, points_m: Array, margin: float = _MARGIN
+    camera_T_target: Array, camera: CameraModel, points_m: Array, margin: float = MARGIN
 ) -> NDArray[np.bool_]:
     """Which poses (N,) show the whole target, `margin` of the image clear of its edges; distortion is left out."""
     points = se3.transform_points(camera_T_target, points_m)

@@ -43,7 +43,7 @@ _LEAST_SIGMA_PX = 0.7
 _SMOOTH_PX = 0.8
 _CLIP_SHARE = 0.9
 _MOST_MOVE_RAD, _MOST_MOVE_M = 0.1, 0.05
-SETTLED = 0.1
+_SETTLED = 0.1
 """Standard deviations of the answer that a move must not exceed for the refinement to have converged."""
 _DAMPING = 1e-3
 _GROUP_SHARE, _FEWEST_COUNTS = 0.3, 50.0
@@ -397,7 +397,7 @@ class Refined:
 
 
 def refine(
-    lines: ContourMatcher, camera_T_parent: Array, step: RefinementLevel, sigmas: float = SETTLED
+    lines: ContourMatcher, camera_T_parent: Array, step: RefinementLevel, sigmas: float = _SETTLED
 ) -> Refined:
     """Damped Gauss-Newton steps of limited length at one size, until a move is `sigmas` standard deviations long."""
     lines.learn(camera_T_parent, step.spacing)
@@ -406,7 +406,7 @@ def refine(
 
 
 def refine_further(
-    lines: ContourMatcher, start: Refined, step: RefinementLevel, radius_m: float, sigmas: float = SETTLED
+    lines: ContourMatcher, start: Refined, step: RefinementLevel, radius_m: float, sigmas: float = _SETTLED
 ) -> Refined:
     """The same from a comparison that was made within `radius_m` already, by the colours found there."""
     pose, found, converged, iteration = start.camera_T_parent, start.last, False, 0
@@ -422,7 +422,7 @@ def refine_further(
     return Refined(pose, found, start.iterations + iteration, converged)
 
 
-def settled(found: ContourEquations, move: NDArray[Any], sigmas: float = SETTLED) -> bool:
+def settled(found: ContourEquations, move: NDArray[Any], sigmas: float = _SETTLED) -> bool:
     """Whether a move (6 + ...) is shorter than so many standard deviations of what the images can tell."""
     return float(move @ found.A @ move) < CORRELATED_POINTS * sigmas**2
 

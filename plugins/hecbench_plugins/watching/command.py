@@ -122,16 +122,12 @@ def _live(
     opened: ExitStack, camera: str, robot: str, host: str | None, settings: tuple[str, ...], rate: float
 ) -> Frames:
     """Frames of a camera with the robot's joints of the same moment."""
-    from hecbench.commands.devices import device_settings, open_device
-    from hecbench.specs import Kind
+    from hecbench.commands.devices import device_settings, open_robot_and_camera
 
     given = device_settings(settings)
-    arm: Any = open_device(Kind.ROBOT, robot, given["robot"] | ({"host": host} if host else {}))
-    opened.callback(arm.close)
-    eye: Any = open_device(Kind.CAMERA, camera, given["camera"])
-    opened.callback(eye.close)
-    if hasattr(eye, "follow"):
-        eye.follow(arm)
+    if host:
+        given["robot"]["host"] = host
+    arm, eye = open_robot_and_camera(opened, robot, camera, given)
     while True:
         began = time.monotonic()
         before = arm.state().joints_rad
