@@ -26,5 +26,5 @@ def judge(folder: Path, tolerance_mm: float) -> Verdict | None:
     if not (specs := quick_solvers(recording)):
         return None
     examined = calibrating.examine(recording)
-    estimates = calibrating.solved(examined, specs, Options(held_out=None))
+    estimates = calibrating.solved(examined, specs, Options())
     return calibrating.judged(examined, specs, estimates, tolerance_mm)

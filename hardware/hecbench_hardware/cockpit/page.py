@@ -24,6 +24,8 @@ from hecbench_hardware.robots.typed import CONVENTIONS, TypedRobot
 _log = logging.getLogger(__name__)
 
 Finish = Callable[[Session], Verdict]
+Work = Callable[[], str | None]
+"""Something to do, and what to say when it has ended."""
 
 
 class Page:
@@ -39,7 +41,7 @@ class Page:
         self._now: Now | None = None
         self._wanted: Suggestion | None = None
         self._judged = 0
-        self._asked: SimpleQueue[Callable[[], str]] = SimpleQueue()
+        self._asked: SimpleQueue[Work] = SimpleQueue()
         self._work, self._judging = ThreadPoolExecutor(1), ThreadPoolExecutor(1)
         self._judge_apart = Worker()
         self._scene = Scene(server, session.cell)
@@ -93,10 +95,11 @@ class Page:
         while not self._asked.empty():
             self._say(self._asked.get())
         try:
-            now = self.session.look()
+            self._show(self.session.look())
         except HecbenchError as error:
             self._seen.content = texts.fault(error)
-            return
+
+    def _show(self, now: Now) -> None:
         self._now = now
         image = now.image if now.seen is None else marked(now.image, now.seen)
         self._picture.image = small(image)
@@ -109,17 +112,18 @@ class Page:
         if self._automatic.value and self.session.worth_taking(now):
             self._say(self._take)
 
-    def _say(self, work: Callable[[], str]) -> None:
-        """Do something and say how it ended."""
+    def _say(self, work: Work) -> None:
+        """Do something and say how it ended, where it has something to say."""
         try:
-            self._said.content = work()
+            said = work()
+            if said is not None:
+                self._said.content = said
         except (HecbenchError, Ended) as error:
             self._said.content = texts.fault(error)
 
-    def _beside(self, work: Callable[[], str]) -> None:
+    def _beside(self, work: Work, executor: ThreadPoolExecutor | None = None) -> None:
         """Do something slow beside the live picture, and say how it ended."""
-        executor = self._judging if work == self._judge_so_far else self._work
-        executor.submit(self._say, work).add_done_callback(_logged)
+        (executor or self._work).submit(self._say, work).add_done_callback(_logged)
 
     def _take(self) -> str:
         said = self.session.take()
@@ -136,9 +140,9 @@ class Page:
         self._covered.content = texts.coverage(self.session.coverage())
         self._scene.show_samples(self.session.flange_poses())
         self._beside(self._suggest)
-        self._beside(self._judge_so_far)
+        self._beside(self._judge_so_far, self._judging)
 
-    def _suggest(self) -> str:
+    def _suggest(self) -> None:
         wanted = self._wanted = self.session.suggest()
         if wanted is None:
             self._next.content = texts.next_pose(None)
@@ -147,7 +151,6 @@ class Page:
             flange = None if wanted.joints_rad is None else self.session.robot.arm.forward(wanted.joints_rad)
             self._next.content = texts.next_pose(self.session.words(wanted, self._now))
             self._scene.show_ghost(wanted.joints_rad, flange)
-        return str(self._said.content)
 
     def _drive(self) -> str:
         if self._wanted is None or self._wanted.joints_rad is None:
@@ -155,14 +158,13 @@ class Page:
         self.session.robot.move_joints(self._wanted.joints_rad)
         return "arrived"
 
-    def _judge_so_far(self) -> str:
+    def _judge_so_far(self) -> None:
         if (count := len(self.session)) != self._judged and count >= FEWEST:
             self.session.recording()
             found = self._judge_apart.call(judging.judge, self.session.folder, self._tolerance_mm)
             if count == len(self.session):
                 self._judged = count
                 self._show_verdict(found)
-        return str(self._said.content)
 
     def _calibrate(self) -> str:
         self._said.content = "calibrating with every method; this takes a while"

@@ -50,44 +50,41 @@ class PointingTab:
 
     def show(self, now: Now) -> None:
         """The camera with its newest picture, once there is an answer."""
-        pointer = self._pointer()
+        pointer = self._session.pointer()
         if pointer is None or now.state is None or time.monotonic() - self._shown_s < _EVERY_S:
             return
         self._shown_s = time.monotonic()
-        base_T_camera = self._session.base_T_parent() @ pointer.estimate.pose
+        base_T_camera = self._session.base_T_parent(now.state) @ pointer.estimate.pose
         picture = self._scene.show_camera(base_T_camera, pointer.camera, small(now.image))
         if not self._clickable:
             self._clickable = True
             picture.on_click(self._clicked)
 
-    def _pointer(self) -> Pointer | None:
-        found = self._session.verdict
-        if found is None or found.recommended is None:
-            return None
-        return self._session.pointer(found.recommended)
-
-    def _known(self) -> Pointer:
-        if (pointer := self._pointer()) is None:
-            raise InputError(f"there is no answer to point with: record {FEWEST} samples, or finish")
-        return pointer
+    def _known(self) -> tuple[Pointer, Array]:
+        """What points, and base_T_parent now."""
+        if (pointer := self._session.pointer()) is None:
+            raise InputError(
+                f"there is no answer to point with: record {FEWEST} samples, or finish, with camera.K in the cell"
+            )
+        return pointer, self._session.base_T_parent(self._session.robot.state())
 
     def _clicked(self, event: Any) -> None:
         def point() -> str:
-            pointer = self._known()
-            base_T_camera = self._session.base_T_parent() @ pointer.estimate.pose
+            pointer, base_T_parent = self._known()
+            base_T_camera = base_T_parent @ pointer.estimate.pose
             ray = np.array(event.ray_origin), np.array(event.ray_direction)
             return self._point(pixel_of(*ray, base_T_camera, pointer.camera))
 
         self._ask(point)
 
     def _look(self) -> str:
-        pointer = self._known()
-        self._scene.look_through(self._session.base_T_parent() @ pointer.estimate.pose, pointer.camera)
+        pointer, base_T_parent = self._known()
+        self._scene.look_through(base_T_parent @ pointer.estimate.pose, pointer.camera)
         return "this is what the camera sees"
 
     def _point(self, pixel: Array) -> str:
-        pointer = self._known()
-        pointed = self._pointed = pointer.at(pixel, self._session.base_T_parent(), self._height.value)
+        pointer, base_T_parent = self._known()
+        pointed = self._pointed = pointer.at(pixel, base_T_parent, self._height.value)
         self._pixel.value = (float(pixel[0]), float(pixel[1]))
         self._server.scene.add_icosphere("/pointed", 0.008, color=_SPOT_RGB, position=pointed.base_m)
         self._text.content = str(pointed)

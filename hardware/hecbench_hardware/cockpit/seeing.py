@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +31,7 @@ class Seen:
     camera_T_target: Array | None
 
 
-def look_for(cell: Recording, image: ImageSource, camera: CameraModel | None) -> Seen | None:
+def look_for(cell: Recording, image: ImageSource) -> Seen | None:
     """The target of a cell in an image; None where it is not seen or the cell has none.
 
     Raises:
@@ -39,16 +39,19 @@ def look_for(cell: Recording, image: ImageSource, camera: CameraModel | None) ->
     """
     if cell.target is None:
         return None
-    known = camera is not None and camera.K is not None
     single = Recording(
         name=cell.name,
         mounting=cell.mounting,
         sample_ids=("now",),
         base_T_flange=np.eye(4)[None],
-        camera=camera if known else _provisional(np.asarray(image)),
+        camera=cell.camera,
         target=cell.target,
         images=(image,),
     )
+    known = cell.camera is not None and cell.camera.K is not None
+    if not known:
+        height, width = single.image(0).shape[:2]
+        single = replace(single, camera=CameraModel.centred(width, height, _FOCAL_IN_WIDTHS * width))
     found = preparation.prepare(single)
     if found.corners_px is None or not np.isfinite(found.corners_px).any():
         return None
@@ -57,15 +60,8 @@ def look_for(cell: Recording, image: ImageSource, camera: CameraModel | None) ->
     return Seen(found.corners_px[0], poses[0] if usable and poses is not None else None)
 
 
-def _provisional(image: NDArray[np.uint8]) -> CameraModel:
-    height, width = image.shape[:2]
-    focal = _FOCAL_IN_WIDTHS * width
-    K = np.array([[focal, 0, (width - 1) / 2], [0, focal, (height - 1) / 2], [0, 0, 1]])
-    return CameraModel(width, height, K)
-
-
 def marked(image: NDArray[np.uint8], seen: Seen) -> NDArray[np.uint8]:
-    """A copy of the image with the corners marked, twice as large in larger pictures."""
+    """A copy of the image with the corners marked, so large that they are seen in a `small` one."""
     picture = image.copy()
     height, width = picture.shape[:2]
     reach = max(_CORNER_PX, width // 300)

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from hecbench import se3
 from hecbench.diagnose.calibrate import calibrate, enclosing_points
 from hecbench.errors import InputError
-from hecbench.estimate import Estimate
 from hecbench.next_view import RobotView
 from hecbench.recording import Mounting, Recording
 from hecbench.se3 import Array
@@ -26,6 +25,7 @@ from hecbench_hardware.devices import Camera, Robot, RobotState
 from hecbench_hardware.motions import six_joints
 from hecbench_hardware.recorder import poses
 from hecbench_hardware.recorder.record import Recorder
+from hecbench_hardware.recorder.session import SampleLine
 
 FEWEST = 6
 """Samples from which on a verdict says something."""
@@ -87,7 +87,7 @@ class Session:
         self._recorder = Recorder(self.robot, self.camera, self.cell, self.folder, self.frames)
         self._rng = np.random.default_rng(0)
         for line in self._recorder.samples:
-            self._seen[line.id] = look_for(self.cell, self.folder / str(line.image), self.cell.camera)
+            self._seen[line.id] = self._target_in(line)
 
     def __len__(self) -> int:
         return len(self._recorder.samples)
@@ -104,7 +104,7 @@ class Session:
                 state: RobotState | None = self.robot.state()
             except InputError:  # nobody has typed a pose yet
                 state = None
-            return Now(image, state, look_for(self.cell, image, self.cell.camera))
+            return Now(image, state, look_for(self.cell, image))
 
     def take(self) -> str:
         """Record a sample; returns what was recorded, in words.
@@ -118,7 +118,7 @@ class Session:
                 raise InputError(f"the robot stands where sample {same} was taken: move it first")
             number = int(self._recorder.samples[-1].id) + 1 if len(self) else 0
             line = self._recorder.take(f"{number:06d}")
-            self._seen[line.id] = look_for(self.cell, self.folder / str(line.image), self.cell.camera)
+            self._seen[line.id] = self._target_in(line)
             if self.cell.target is None:
                 return f"sample {line.id} taken"
             return f"sample {line.id} taken, the target {'seen' if self._seen[line.id] else 'NOT seen'}"
@@ -210,24 +210,23 @@ class Session:
             seen = now.seen if now else None
             return suggestion.target_words(seen.camera_T_target if seen else None, wanted.camera_T_target)
         assert wanted.joints_rad is not None
-        return suggestion.joint_words(self.robot.state().joints_rad, wanted.joints_rad)
+        state = now.state if now and now.state else self.robot.state()
+        return suggestion.joint_words(state.joints_rad, wanted.joints_rad)
 
-    def pointer(self, estimate: Estimate) -> Pointer:
-        """Points with a calibration of this cell.
+    def pointer(self) -> Pointer | None:
+        """Points with the recommended answer; None while there is none, or its camera's K is not known."""
+        best = None if self.verdict is None else self.verdict.recommended
+        camera = (best and best.camera) or self.cell.camera
+        if best is None or camera is None or camera.K is None:
+            return None
+        return Pointer(best, camera, len(self))
 
-        Raises:
-            InputError: The camera's K is not known.
-        """
-        camera = estimate.camera or self.cell.camera
-        if camera is None or camera.K is None:
-            raise InputError(f"{self.cell.name}: pointing needs camera.K")
-        return Pointer(estimate, camera, len(self))
+    def base_T_parent(self, state: RobotState) -> Array:
+        """(4, 4) m: the flange where the camera moves, else the base itself."""
+        return state.base_T_flange if self.cell.mounting is Mounting.EYE_IN_HAND else np.eye(4)
 
-    def base_T_parent(self) -> Array:
-        """(4, 4) m now: the flange where the camera moves, else the base itself."""
-        if self.cell.mounting is Mounting.EYE_TO_HAND:
-            return np.eye(4)
-        return self.robot.state().base_T_flange
+    def _target_in(self, line: SampleLine) -> Seen | None:
+        return look_for(self.cell, self.folder / str(line.image))
 
     def _reach(self) -> Reach | None:
         try:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hecbench_hardware.cockpit import judging
+from hecbench_hardware.cockpit.pointing import Pointer
 from hecbench_hardware.cockpit.session import Session
 from hecbench_hardware.recorder import poses
 from hecbench_hardware.robots.typed import TypedRobot
@@ -108,7 +109,7 @@ def test_a_cell_without_a_target_is_shown_by_its_joints(recorded, open_session, 
 def test_pointing_finds_what_the_camera_sees(recorded):
     truth = recorded.camera.base_T_camera
     covariance = np.diag([1e-6] * 6)
-    pointer = recorded.pointer(Estimate(truth, covariance=covariance, solver="x"))
+    pointer = Pointer(Estimate(truth, covariance=covariance, solver="x"), recorded.cell.camera, len(recorded))
     point = np.array([-0.45, 0.1, 0.05])
     from hecbench import lens
 
@@ -118,6 +119,18 @@ def test_pointing_finds_what_the_camera_sees(recorded):
     assert found.expected.low < found.expected.value < found.expected.high
     with pytest.raises(InputError, match="does not meet the plane"):
         pointer.at(pixel, np.eye(4), 5.0)
+
+
+@pytest.mark.parametrize("known", ["size", "nothing"])
+def test_a_camera_whose_matrix_is_not_known_still_finds_the_target(recorded, open_session, tmp_path, known):
+    size = replace(recorded.cell.camera, K=None) if known == "size" else None
+    session = open_session(tmp_path / "unknown", cell=replace(recorded.cell, camera=size))
+    if known == "nothing":  # the lab's camera knows its own
+        session.cell = replace(session.cell, camera=None)
+    session.robot.move_joints(session.suggest().joints_rad)
+    assert session.take().endswith("the target seen")
+    assert session.coverage().distances_m is None
+    assert session.pointer() is None
 
 
 def test_the_first_cell_of_the_docs_can_be_loaded(tmp_path):
