@@ -52,6 +52,7 @@ class _Content:
     uncalibrated: bool = False
     picture_stamps: list[float] = field(default_factory=list)
     change: list[float] = field(default_factory=list)
+    brightest: int = 255
 
 
 def sniff(path: Path) -> bool:
@@ -69,7 +70,7 @@ def load(path: Path) -> Recording:
         stamps, values, ways = _robot(path, content, hints)
         offset, notes = _offset(path, content, stamps, values, hints)
         chosen, rows = _chosen(path, content, stamps, values, offset)
-        images = _stored(reader, topic, {content.picture_stamps[i] for i in chosen})
+        images = _stored(reader, topic, {content.picture_stamps[i] for i in chosen}, content.brightest)
     if content.camera is None and hints.camera is None:
         why = "its camera_info holds no intrinsics" if content.uncalibrated else "it has no camera_info"
         notes.append(
@@ -122,7 +123,10 @@ def _collected(reader: Any, topic: str) -> _Content:
     for connection, received, raw in reader.messages():
         kind = connection.msgtype
         if connection.topic == topic:
-            picture = bags.small(bags.picture_of(reader.deserialize(raw, kind), topic))
+            whole = bags.picture_of(reader.deserialize(raw, kind), topic)
+            if not isinstance(whole, bytes) and whole.size:
+                content.brightest = max(content.brightest, int(whole.max()))
+            picture = bags.small(whole)
             content.picture_stamps.append(bags.header_stamp_s(raw, reader.is2, received))
             content.change.append(
                 0.0 if picture is None or last is None else float(np.abs(picture - last).mean())
@@ -263,7 +267,7 @@ def _chosen(
     return chosen, rows
 
 
-def _stored(reader: Any, topic: str, wanted: set[float]) -> list[Path]:
+def _stored(reader: Any, topic: str, wanted: set[float], brightest: int) -> list[Path]:
     """The pictures of these stamps in files that live as long as the process."""
     folder = Path(tempfile.mkdtemp(prefix="hecbench-bag-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
@@ -274,9 +278,11 @@ def _stored(reader: Any, topic: str, wanted: set[float]) -> list[Path]:
             continue
         wanted.discard(bags.header_stamp_s(raw, reader.is2, received))
         picture = bags.picture_of(reader.deserialize(raw, connection.msgtype), topic)
-        jpeg = isinstance(picture, bytes) and picture[:2] == b"\xff\xd8"
-        file = folder / f"{len(found):06d}{'.jpg' if jpeg else '.png'}"
-        files.write_bytes(file, picture if isinstance(picture, bytes) else encode_png(picture))
+        if not isinstance(picture, bytes):
+            picture = encode_png(bags.eight_bit(picture, brightest))
+        suffix = ".jpg" if picture[:2] == b"\xff\xd8" else ".png"
+        file = folder / f"{len(found):06d}{suffix}"
+        files.write_bytes(file, picture)
         found.append(file)
     return found
 

@@ -16,6 +16,7 @@ from hecbench.lens import EQUIDISTANT, OPENCV, CameraModel
 from hecbench_datasets.reading.sources import files_in
 
 Picture = NDArray[np.uint8]
+Wide = NDArray[np.uint16]
 
 SUFFIXES = (".bag", ".mcap", ".db3")
 IMAGE, COMPRESSED = "sensor_msgs/msg/Image", "sensor_msgs/msg/CompressedImage"
@@ -33,6 +34,8 @@ _MODELS = {
 _CHANNELS = {"mono8": 1, "8UC1": 1, "rgb8": 3, "bgr8": 3, "8UC3": 3, "rgba8": 4, "bgra8": 4}
 _BAYER = {"bayer_rggb8": "BG", "bayer_bggr8": "RG", "bayer_gbrg8": "GR", "bayer_grbg8": "GB"}
 """OpenCV names a pattern by the second row's second and third pixel."""
+_YUV = {"yuv422": "UYVY", "uyvy": "UYVY", "yuv422_yuy2": "YUY2", "yuyv": "YUY2"}
+_WIDE = ("mono16", "16UC1")
 
 
 def bag_files(path: Path) -> list[Path]:
@@ -76,23 +79,28 @@ def camera_model(info: Any, topic: str) -> CameraModel | None:
     """The lens of a camera_info; None when it holds none.
 
     Raises:
-        InputError: its lens model is not known, or it is of a cut or binned picture.
+        InputError: its lens model is not known and has coefficients, or it is of a cut or binned picture.
     """
     K = np.array(getattr(info, "K", getattr(info, "k", None)), float).reshape(3, 3)
     lens = np.array(getattr(info, "D", getattr(info, "d", ())), float)
     if K[0, 0] <= 0:
         return None
-    if info.distortion_model not in _MODELS:
+    if lens.any() and info.distortion_model not in _MODELS:
         known = ", ".join(filter(None, _MODELS))
         raise InputError(f"{topic}: distortion_model '{info.distortion_model}' is not one of {known}")
-    if info.binning_x > 1 or info.binning_y > 1 or info.roi.width or info.roi.height:
+    cut = (info.roi.width, info.roi.height) not in ((0, 0), (info.width, info.height))
+    if info.binning_x > 1 or info.binning_y > 1 or cut:
         raise InputError(f"{topic}: is of a binned or cut picture; give the camera in hecbench-import.yaml")
+    if not lens.any():
+        return CameraModel(info.width, info.height, K)
     model, length = _MODELS[info.distortion_model]
-    return CameraModel(info.width, info.height, K, lens[:length] if lens.any() else np.zeros(0), model)
+    if model == EQUIDISTANT or not lens[length:].any():  # image_geometry too gives OpenCV all that are there
+        lens = lens[:length]
+    return CameraModel(info.width, info.height, K, lens, model)
 
 
-def picture_of(message: Any, topic: str) -> Picture | bytes:
-    """A picture (H, W, 3) RGB or (H, W), or the bytes of a compressed one.
+def picture_of(message: Any, topic: str) -> Picture | Wide | bytes:
+    """A picture (H, W, 3) RGB or (H, W), grey ones of 8 or 16 bits, or the bytes of a compressed one.
 
     Raises:
         InputError: its encoding is not known, or its size does not fit.
@@ -100,10 +108,10 @@ def picture_of(message: Any, topic: str) -> Picture | bytes:
     if not hasattr(message, "encoding"):
         return bytes(message.data)
     encoding = str(message.encoding)
-    if encoding in ("mono16", "16UC1"):
+    if encoding in _WIDE:
         wide = np.frombuffer(message.data.tobytes(), ">u2" if message.is_bigendian else "<u2")
-        return np.asarray(wide.reshape(message.height, -1)[:, : message.width] >> 8, np.uint8)
-    channels = 1 if encoding in _BAYER else _CHANNELS.get(encoding)
+        return np.asarray(wide.reshape(message.height, -1)[:, : message.width], np.uint16)
+    channels = 1 if encoding in _BAYER else 2 if encoding in _YUV else _CHANNELS.get(encoding)
     if channels is None:
         raise InputError(
             f"{topic}: encoding '{encoding}' is not read; record it as rgb8, mono8 or compressed"
@@ -111,17 +119,22 @@ def picture_of(message: Any, topic: str) -> Picture | bytes:
     rows = np.asarray(message.data, np.uint8).reshape(message.height, message.step)[
         :, : message.width * channels
     ]
-    if encoding in _BAYER:
+    pixels = np.ascontiguousarray(rows).reshape(message.height, message.width, channels)
+    if encoding in _BAYER or encoding in _YUV:
         import cv2
 
-        pattern = getattr(cv2, f"COLOR_Bayer{_BAYER[encoding]}2RGB")
-        return np.asarray(cv2.cvtColor(np.ascontiguousarray(rows), pattern), np.uint8)
-    pixels = rows.reshape(message.height, message.width, channels)
+        code = f"Bayer{_BAYER[encoding]}2RGB" if encoding in _BAYER else f"YUV2RGB_{_YUV[encoding]}"
+        return np.asarray(cv2.cvtColor(pixels, getattr(cv2, f"COLOR_{code}")), np.uint8)
     pixels = pixels[..., 2::-1] if encoding.startswith("bgr") or encoding == "8UC3" else pixels[..., :3]
     return np.ascontiguousarray(pixels[..., 0] if channels == 1 else pixels)
 
 
-def small(picture: Picture | bytes) -> NDArray[np.float32] | None:
+def eight_bit(picture: Picture | Wide, brightest: int) -> Picture:
+    """A picture of a stream whose largest value is `brightest`, with 8 of its 8 to 16 bits."""
+    return np.asarray(picture >> max(0, brightest.bit_length() - 8), np.uint8)
+
+
+def small(picture: Picture | Wide | bytes) -> NDArray[np.float32] | None:
     """A small grey picture to compare with the next; None when it cannot be decoded."""
     import cv2
 

@@ -27,6 +27,8 @@ class DepthSettings:
             2017). Used until the residuals give their own.
         around: how far off a start may be when the descent from the start itself fails.
         stages: coarse to fine.
+        rough: how many of the stages come before an end is compared with the depth for the first time.
+        settled: a stage ends at a step of so many standard deviations.
         floor_m: of a residual's standard deviation: the model's own error.
         grazing: least cosine between a face's normal and the ray; flatter ones are mostly smeared edges.
         agreeing_m, beyond_m: offset within which a pixel agrees, or four standard deviations where these are more but
@@ -37,6 +39,7 @@ class DepthSettings:
         correlated_pixels: that say as much as one: a few matching windows of a stereo camera.
         draws, followed: poses drawn around a start, and how many of the best are followed.
         search_level, search_views: size and number of the pictures that draws are compared with.
+        moved_level: size at which what moved is compared with an end.
         sphere_deg, sphere_starts: of a search without a start: spacing of its directions, and starts followed.
         moved_m: a pixel nearer than the background by this and five standard deviations shows something that moved.
         least_explained: share of those pixels that must lie on the drawn robot, for a fixed camera.
@@ -51,6 +54,8 @@ class DepthSettings:
         Stage(2, 0.03, 6),
         Stage(1, 0.015, 4),
     )
+    rough: int = 2
+    settled: float = 0.1
     floor_m: float = 1e-3
     grazing: float = 0.25
     agreeing_m: float = 0.01
@@ -59,10 +64,11 @@ class DepthSettings:
     most_beyond: float = 0.12
     least_pixels: int = 500
     correlated_pixels: float = 70.0
-    draws: int = 400
+    draws: int = 200
     followed: int = 8
-    search_level: int = 8
+    search_level: int = 16
     search_views: int = 4
+    moved_level: int = 8
     sphere_deg: float = 15.0
     sphere_starts: int = 10
     moved_m: float = 0.05

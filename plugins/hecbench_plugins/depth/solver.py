@@ -7,8 +7,8 @@ gives point and plane of every pixel, so no neighbours are searched. Gauss-Newto
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from hecbench.errors import Refusal, SolverFailure
 from hecbench.estimate import Estimate, Termination
 from hecbench.recording import Mounting, Recording
 from hecbench.se3 import Array
-from hecbench_plugins.depth.settings import DepthSettings
+from hecbench_plugins.depth.settings import DepthSettings, Stage
 from hecbench_plugins.depth.starts import around, on_a_sphere
 from hecbench_plugins.depth.views import FEWEST_VIEWS, Agreement, DepthViews
 from hecbench_plugins.maskless.align import limited
@@ -27,20 +27,19 @@ from hecbench_plugins.second_order.descent import Trace
 from hecbench_plugins.second_order.silhouette import distances_at, silhouette_step
 from hecbench_plugins.views.pyramid import prepare
 
-_SETTLED = 1e-5
-"""rad and m of a step, at which a stage ends: far below any noise."""
 _CLIP_PX = 3.0
 """Of a mask's contour, from which on a crossing counts less."""
 
 
 @dataclass(frozen=True, eq=False)
 class _End:
-    """Where a descent ended."""
+    """Where a descent ended, with the noise of depth that it found."""
 
     camera_T_parent: Array
-    agreement: Agreement
-    information: Array
-    iterations: int
+    noise_per_m: float
+    agreement: Agreement = field(default_factory=lambda: Agreement(0.0, 1.0, 0))
+    information: Array = field(default_factory=lambda: np.zeros((6, 6)))
+    iterations: int = 0
 
 
 @dataclass(frozen=True)
@@ -61,10 +60,10 @@ class DepthIcp:
         views = DepthViews.of(recording, settings)
         views.robot.check_start(recording)
         fixed = recording.mounting is Mounting.EYE_TO_HAND and len(views) >= FEWEST_VIEWS
-        moved = views.moved(settings.search_level) if fixed else None
+        moved = views.moved(settings.moved_level) if fixed else None
         ends: list[_End] = []
-        for start in self._starts(recording, views, rng):
-            ends.append(end := self._descended(views, start))
+        for end in self._ends(views, self._starts(recording, views, rng)):
+            ends.append(end)
             if self._is_right(end, views, moved):
                 if self.silhouette:
                     end = self._with_masks(recording, views, end)
@@ -73,7 +72,7 @@ class DepthIcp:
             raise Refusal(
                 "no start: give initial_parent_T_camera, --init FILE, or three views of a fixed camera"
             )
-        best = max((end.agreement for end in ends), key=lambda fit: fit.agreeing - fit.beyond)
+        best = max((end.agreement for end in ends), key=lambda agreement: agreement.fit)
         raise SolverFailure(_why_not(best, len(ends), settings))
 
     def _starts(self, recording: Recording, views: DepthViews, rng: np.random.Generator) -> Iterator[Array]:
@@ -84,23 +83,37 @@ class DepthIcp:
         elif recording.mounting is Mounting.EYE_TO_HAND:
             yield from on_a_sphere(views)
 
-    def _descended(self, views: DepthViews, pose: Array) -> _End:
-        settings, noise, iterations = self.settings, self.settings.noise_per_m, 0
-        A = np.zeros((6, 6))
-        for stage in settings.stages:
+    def _ends(self, views: DepthViews, starts: Iterable[Array]) -> Iterator[_End]:
+        """Descents that agree at a coarse size as they come, the others after them, the best first."""
+        settings = self.settings
+        rough, fine = settings.stages[: settings.rough], settings.stages[settings.rough :]
+        later = []
+        for start in starts:
+            end = self._descended(views, _End(start, settings.noise_per_m), rough)
+            if end.agreement.agreeing >= settings.least_agreeing:
+                yield self._descended(views, end, fine)
+            else:
+                later.append(end)
+        for end in sorted(later, key=lambda end: end.agreement.fit, reverse=True):
+            yield self._descended(views, end, fine)
+
+    def _descended(self, views: DepthViews, start: _End, stages: Sequence[Stage]) -> _End:
+        settings, pose, noise = self.settings, start.camera_T_parent, start.noise_per_m
+        information, iterations = start.information, start.iterations
+        for stage in stages:
             for _ in range(stage.iterations):
                 iterations += 1
-                A, b, count = views.normal_equations(pose, stage, noise)
+                information, gradient, count = views.normal_equations(pose, stage, noise)
                 if count < settings.least_pixels / stage.level**2:
                     break
-                move = np.linalg.solve(A + 1e-6 * np.diag(np.diag(A)) + 1e-9 * np.eye(6), b)
-                pose = se3.exp(limited(move)) @ pose
-                if np.abs(move).max() < _SETTLED:
+                move = _step(information, gradient)
+                pose = se3.exp(move) @ pose
+                if move @ information @ move < settings.settled**2:
                     break
-            if stage.level <= 2 and np.isfinite(found := views.noise(pose, 4 * stage.limit_m)):
+            if stage.level == 2 and np.isfinite(found := views.noise(pose, 4 * stage.limit_m)):
                 noise = float(np.clip(found, 0.1 * settings.noise_per_m, 4 * settings.noise_per_m))
-        fit = views.agreement(pose, range(len(views)), 2, noise)
-        return _End(pose, fit, A / settings.correlated_pixels, iterations)
+        fit = views.agreement(pose, max(2, stages[-1].level), noise)
+        return _End(pose, noise, fit, information, iterations)
 
     def _is_right(self, end: _End, views: DepthViews, moved: NDArray[np.float32] | None) -> bool:
         settings, fit = self.settings, end.agreement
@@ -110,7 +123,7 @@ class DepthIcp:
             return False
         if moved is None:
             return True
-        return views.explained(end.camera_T_parent, moved, settings.search_level) >= settings.least_explained
+        return views.explained(end.camera_T_parent, moved, settings.moved_level) >= settings.least_explained
 
     def _with_masks(self, recording: Recording, views: DepthViews, end: _End) -> _End:
         """Further steps on depth and the masks' contours together."""
@@ -122,15 +135,14 @@ class DepthIcp:
         pose, information, iterations = end.camera_T_parent, end.information, end.iterations
         for _ in range(2 * last.iterations):
             iterations += 1
-            A, b, _ = views.normal_equations(pose, last, settings.noise_per_m)
+            information, gradient, _ = views.normal_equations(pose, last, end.noise_per_m)
             _, contour_A, contour_b = contour(pose)
-            information = A / settings.correlated_pixels + contour_A / settings.mask_sigma_px**2
-            gradient = b / settings.correlated_pixels + contour_b / settings.mask_sigma_px**2
-            move = np.linalg.solve(information + 1e-9 * np.eye(6), gradient)
-            pose = se3.exp(limited(move)) @ pose
-            if np.abs(move).max() < _SETTLED:
+            information += contour_A / settings.mask_sigma_px**2
+            move = _step(information, gradient + contour_b / settings.mask_sigma_px**2)
+            pose = se3.exp(move) @ pose
+            if move @ information @ move < settings.settled**2:
                 break
-        return _End(pose, end.agreement, information, iterations)
+        return replace(end, camera_T_parent=pose, information=information, iterations=iterations)
 
     def _answer(self, views: DepthViews, end: _End, followed: int) -> Estimate:
         covariance = np.linalg.inv(end.information + 1e-9 * np.eye(6))
@@ -151,6 +163,12 @@ class DepthIcp:
             renders=views.renders,
             diagnostics=details,
         )
+
+
+def _step(information: Array, gradient: Array) -> Array:
+    """Gauss-Newton's, damped a little, of believable length."""
+    damping = 1e-6 * np.diag(np.diag(information)) + 1e-9 * np.eye(6)
+    return limited(np.linalg.solve(information + damping, gradient))
 
 
 def _why_not(fit: Agreement, followed: int, settings: DepthSettings) -> str:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.se3 import Array
@@ -22,10 +21,9 @@ def around(views: DepthViews, start: Array, rng: np.random.Generator) -> Iterato
     settings = views.settings
     ball, level, chosen = settings.around, settings.search_level, views.spread(settings.search_views)
     poses = se3.inverse(ball.pose(start, ball.draw(rng, settings.draws)))
-    fits = [views.agreement(pose, chosen, level, settings.noise_per_m) for pose in poses]
-    least = settings.least_pixels / level**2
-    scores = [-fit.cost_m if fit.pixels >= least else -np.inf for fit in fits]
-    for index in best_apart(list(poses), scores, settings.followed, _APART):
+    costs_m, pixels = views.costs(poses, chosen, level)
+    scores = np.where(pixels >= settings.least_pixels / level**2, -costs_m, -np.inf)
+    for index in best_apart(list(poses), scores.tolist(), settings.followed, _APART):
         if np.isfinite(scores[index]):
             yield poses[index]
 
@@ -35,20 +33,11 @@ def on_a_sphere(views: DepthViews) -> Iterator[Array]:
     if len(views) < FEWEST_VIEWS:
         return
     moved, settings = views.moved(1), views.settings
+    near = np.concatenate([depth[there > 0] for depth, there in zip(views.depths, moved, strict=True)])
+    if not near.size:
+        return
     sphere, coarsest = ViewSphere(spacing_deg=settings.sphere_deg), views.meshes[max(views.meshes)]
     seen = views.K, views.valid, views.parent_T_link, moved
-    for pose in by_photographs.starts(coarsest, *seen, sphere, settings.sphere_starts):
-        yield _at_measured_distance(views, pose, moved)
-
-
-def _at_measured_distance(views: DepthViews, camera_T_parent: Array, moved: NDArray[np.float32]) -> Array:
-    """The pose moved along the view until the robot is as far off as what moved."""
-    measured = np.median(np.concatenate([d[m > 0] for d, m in zip(views.depths, moved, strict=True)]))
-    origins = (camera_T_parent @ views.parent_T_link)[..., :3, 3].reshape(-1, 3)
-    distance = float(np.median(origins[:, 2]))
-    if not np.isfinite(measured) or distance <= 0:
-        return camera_T_parent
-    scaled = camera_T_parent.copy()
-    middle = origins.mean(0)
-    scaled[:3, 3] += middle * (measured / distance - 1)
-    return scaled
+    yield from by_photographs.starts(
+        coarsest, *seen, sphere, settings.sphere_starts, [float(np.median(near))]
+    )

@@ -31,12 +31,16 @@ _BACKGROUND = 0.7
 
 @dataclass(frozen=True)
 class Agreement:
-    """How a pose fits: shares of the drawn pixels that agree and that are seen through, how many have depth, a cost."""
+    """How a pose fits: shares of the drawn pixels that agree and that are seen through, and how many have depth."""
 
     agreeing: float
     beyond: float
     pixels: int
-    cost_m: float
+
+    @property
+    def fit(self) -> float:
+        """To order ends by: from -1 to 1."""
+        return self.agreeing - self.beyond
 
 
 @dataclass(eq=False)
@@ -135,13 +139,13 @@ class DepthViews:
             there = moved[view] > 0
             return float((there & (renderer.face >= 0)).sum()), float(there.sum())
 
-        on_robot, every = np.sum(self._each(range(len(self)), camera_T_parent, level, one), 0)
+        on_robot, every = np.sum(self._each(camera_T_parent, level, one), 0)
         return float(on_robot / every) if every else 1.0
 
     def normal_equations(
         self, camera_T_parent: Array, stage: Stage, noise: float
     ) -> tuple[Array, Array, int]:
-        """A (6, 6), b (6,) and the pixels used, of all views at one size."""
+        """Information (6, 6), gradient (6,) and the pixels used, of all views at one size."""
         level, settings = stage.level, self.settings
         intrinsics = np.array([self.K[0, 0], self.K[1, 1], self.K[0, 2], self.K[1, 2]]) / level
         mesh = mesh_at(self.meshes, level)
@@ -164,16 +168,17 @@ class DepthViews:
             )
             return A, b, kernels.add_pixels(drawn, depth, intrinsics, *limits, A, b)
 
-        found = self._each(range(len(self)), camera_T_parent, level, one)
+        found = self._each(camera_T_parent, level, one)
         A, b, counts = (np.array(column) for column in zip(*found, strict=True))
-        return A.sum(0), b.sum(0), int(counts.sum())
+        one_of = settings.correlated_pixels
+        return A.sum(0) / one_of, b.sum(0) / one_of, int(counts.sum())
 
-    def agreement(self, camera_T_parent: Array, views: Iterable[int], level: int, noise: float) -> Agreement:
-        """How the drawn robot fits the depth of some views."""
+    def agreement(self, camera_T_parent: Array, level: int, noise: float) -> Agreement:
+        """How the drawn robot fits the depth pictures."""
 
-        def one(view: int, renderer: Renderer) -> tuple[Array, float]:
+        def one(view: int, renderer: Renderer) -> Array:
             counts = np.zeros(4)
-            cost = kernels.compare(
+            kernels.compare(
                 renderer.face,
                 renderer.nearness,
                 renderer.box,
@@ -183,13 +188,40 @@ class DepthViews:
                 self.settings.beyond_m,
                 counts,
             )
-            return counts, cost
+            return counts
 
-        found = self._each(views, camera_T_parent, level, one)
-        agreeing, before, beyond, pixels = np.sum([counts for counts, _ in found], 0).tolist()
-        cost = sum(cost for _, cost in found) / pixels if pixels else np.inf
+        found = self._each(camera_T_parent, level, one)
+        agreeing, before, beyond, pixels = np.sum(found, 0).tolist()
         judged = max(pixels - before, 1.0)
-        return Agreement(agreeing / judged, beyond / judged, int(pixels), float(cost))
+        return Agreement(agreeing / judged, beyond / judged, int(pixels))
+
+    def costs(self, camera_T_parent: Array, views: Iterable[int], level: int) -> tuple[Array, Array]:
+        """Mean offset of depth from the drawn robot in some views, m, for each of P poses, and pixels compared.
+
+        Args:
+            camera_T_parent: (P, 4, 4).
+
+        Returns:
+            (P,) m, infinite where the robot is nowhere drawn on measured depth, and (P,).
+        """
+        chosen, renderers = list(views), self._drawers(level)
+        found = np.zeros((len(camera_T_parent), 2))
+        self.renders += len(chosen) * len(found)
+        limits = self.settings.noise_per_m, self.settings.agreeing_m, self.settings.beyond_m
+
+        def share(number: int) -> None:
+            renderer, counts = renderers[number], np.zeros(4)
+            for index in range(number, len(found), len(renderers)):
+                counts[:] = 0
+                for view in chosen:
+                    renderer.rasterise(camera_T_parent[index] @ self.parent_T_link[view])
+                    drawn = renderer.face, renderer.nearness, renderer.box
+                    found[index, 0] += kernels.compare(*drawn, self._depth(view, level), *limits, counts)
+                found[index, 1] = counts[3]
+
+        threads.each(share, range(len(renderers)))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(found[:, 1] > 0, found[:, 0] / found[:, 1], np.inf), found[:, 1]
 
     def noise(self, camera_T_parent: Array, limit_m: float) -> float:
         """The noise of depth over the square of the distance, 1/m, by the median offset from the drawn robot."""
@@ -201,24 +233,19 @@ class DepthViews:
             count = kernels.relative_offsets(*drawn, depth, limit_m, found)
             return float(np.median(found[:count])) if count else np.nan
 
-        offsets = self._each(range(len(self)), camera_T_parent, 2, one)
+        offsets = self._each(camera_T_parent, 2, one)
         return float(1.4826 * np.nanmedian(offsets)) if np.isfinite(offsets).any() else np.nan
 
     def _each(
-        self,
-        views: Iterable[int],
-        camera_T_parent: Array,
-        level: int,
-        work: Callable[[int, Renderer], Result],
+        self, camera_T_parent: Array, level: int, work: Callable[[int, Renderer], Result]
     ) -> list[Result]:
         """`work(view, renderer)` with the robot drawn, for every view, in threads."""
-        chosen = list(views)
         renderers = self._drawers(level)
-        self.renders += len(chosen)
+        self.renders += len(self)
 
         def share(number: int) -> list[tuple[int, Result]]:
             done = []
-            for view in chosen[number :: len(renderers)]:
+            for view in range(number, len(self), len(renderers)):
                 renderers[number].rasterise(camera_T_parent @ self.parent_T_link[view])
                 done.append((view, work(view, renderers[number])))
             return done

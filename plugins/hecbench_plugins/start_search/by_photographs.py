@@ -7,6 +7,8 @@ of them at once: the cost is linear in what is covered, so its change by a shift
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -38,6 +40,7 @@ def starts(
     foreground: NDArray[np.float32],
     sphere: ViewSphere,
     count: int,
+    distances_m: Sequence[float] | None = None,
 ) -> list[Array]:
     """The best camera_T_parent (4, 4), best first, distinct, for the search to begin at.
 
@@ -49,11 +52,14 @@ def starts(
         foreground: (N, H, W) how unlike the background each pixel is.
         sphere: directions and rolls to try.
         count: how many to return.
+        distances_m: of the camera from the middle of the moving links; without them 1.2 to 4.9 times their extent.
     """
     middle, span = _moving(parent_T_link)
+    if distances_m is None:
+        distances_m = [factor * span for factor in _DISTANCES]
     centre = np.array([0.0, 0.0, 1.0])
     rotations = sphere.rotations()
-    poses = np.concatenate([look_at(rotations, middle, centre, factor * span) for factor in _DISTANCES])
+    poses = np.concatenate([look_at(rotations, middle, centre, distance) for distance in distances_m])
     views = np.unique(np.linspace(0, len(parent_T_link) - 1, _VIEWS).round().astype(int))
     seen = K, valid, parent_T_link[views], foreground[views]
     _, costs = _shifted(mesh, seen, poses, _COARSE_PX)
