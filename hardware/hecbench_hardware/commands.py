@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -52,6 +53,11 @@ def controller(host: str, model: str, time_scale: float) -> None:
     help="How --poses chooses: diverse poses of the target, or views in which the robot tells most about the camera. "
     "Default: diverse, or d_optimal for a cell without a target.",
 )
+@click.option(
+    "--init",
+    metavar="WHERE",
+    help="Where the camera is, roughly, in place of the CELL's: as for `solve --init`, e.g. 'looking-at 1.2 0.3 0.7'.",
+)
 @click.option("--freedrive", is_flag=True, help="Guide the arm by hand instead of driving a plan.")
 @click.option(
     "--frames", type=click.IntRange(min=1), default=1, show_default=True, help="Averaged per sample."
@@ -71,6 +77,7 @@ def record(
     settings: tuple[str, ...],
     poses: int | None,
     criterion: str | None,
+    init: str | None,
     freedrive: bool,
     frames: int,
     dry_run: bool,
@@ -83,6 +90,7 @@ def record(
     CELL describes camera, target and mounting. Its samples are the plan, or with --poses the first one is the
     start of a planned one, or with --freedrive they are not used. The checked plan is written to OUT/plan.json.
     """
+    from hecbench.running.starts import start_of
     from hecbench.specs import Kind
     from hecbench.storage import recording_io
     from hecbench_hardware.arming import Operator, take_control
@@ -94,6 +102,8 @@ def record(
     if criterion is not None and poses is None:
         raise InputError(f"--plan {criterion}: say how many with --poses")
     plan = recording_io.load(cell)
+    if init is not None:
+        plan = replace(plan, initial_parent_T_camera=start_of(init, plan))
     given = device_settings(settings)
     extra = {"host": host, "limits": None if limits is None else str(limits)}
     with ExitStack() as open_devices:

@@ -83,23 +83,20 @@ def test_dry_run_writes_the_plan_and_nothing_else(invoke, cell, tmp_path):
 
 def test_a_cell_without_a_target_gets_views_of_the_robot(invoke, cell, tmp_path):
     with_target = recording_io.load(cell)
-    base_T_flange = with_target.base_T_flange[0]
-    eye = np.array([-1.6, -1.2, 0.6])
-    forward = (base_T_flange[:3, 3] / 2 - eye) / np.linalg.norm(base_T_flange[:3, 3] / 2 - eye)
-    right = np.cross(forward, [0, 0, 1]) / np.linalg.norm(np.cross(forward, [0, 0, 1]))
     markerless = Recording(
         name="markerless",
         mounting=Mounting.EYE_TO_HAND,
         sample_ids=("0",),
         robot=with_target.robot,
         camera=with_target.camera,
-        initial_parent_T_camera=se3.make(np.stack([right, np.cross(forward, right), forward], 1), eye),
         joints_rad=with_target.joints_rad[:1],
     )
     recording_io.save(markerless, tmp_path / "markerless")
     out = tmp_path / "out"
-    result = invoke(tmp_path / "markerless", "--out", out, *FAST, "--poses", 3, "--dry-run")
-    assert result.exit_code == 0
+    words = tmp_path / "markerless", "--out", out, *FAST, "--poses", 3, "--dry-run"
+    with pytest.raises(InputError, match="initial_parent_T_camera"):
+        invoke(*words)
+    assert invoke(*words, "--init", "looking-at -1.6 -1.2 0.6").exit_code == 0
     assert json.loads((out / "plan.json").read_text())["motions"] == 3
 
 
@@ -123,6 +120,8 @@ def test_freedrive_on_a_simulated_arm(invoke, cell, tmp_path):
         (("--robot", "sim_ur10e"), "was made for a ur5e"),
         (("--robot", "ur5e"), "host="),
         (("--freedrive", "--dry-run"), "--freedrive has no plan"),
+        (("--poses", "4", "--init", "far away"), "is no file that exists, and not numbers"),
+        (("--poses", "4", "--init", "0 0.06 40 0 0 0"), "write metres, not millimetres"),
     ],
 )
 def test_wrong_words_are_one_line(invoke, cell, tmp_path, words, complaint):

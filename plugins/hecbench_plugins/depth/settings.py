@@ -41,6 +41,7 @@ class DepthSettings:
         search_level, search_views: size and number of the pictures that draws are compared with.
         moved_level: size at which what moved is compared with an end.
         sphere_deg, sphere_starts: of a search without a start: spacing of its directions, and starts followed.
+        sphere_distances: tried of the robot's middle, over the median depth of what moved, which is its near side.
         moved_m: a pixel nearer than the background by this and five standard deviations shows something that moved.
         least_explained: share of those pixels that must lie on the drawn robot, for a fixed camera.
         mask_sigma_px: of a mask's contour, its crossings correlated, for `silhouette`.
@@ -70,7 +71,8 @@ class DepthSettings:
     search_views: int = 4
     moved_level: int = 8
     sphere_deg: float = 15.0
-    sphere_starts: int = 10
+    sphere_starts: int = 30
+    sphere_distances: tuple[float, ...] = (1.0, 1.15)
     moved_m: float = 0.05
     least_explained: float = 0.4
     mask_sigma_px: float = 2.5

@@ -94,7 +94,8 @@ class DepthIcp:
                 yield self._descended(views, end, fine)
             else:
                 later.append(end)
-        for end in sorted(later, key=lambda end: end.agreement.fit, reverse=True):
+        later.sort(key=lambda end: end.agreement.fit, reverse=True)
+        for end in later[: settings.followed]:
             yield self._descended(views, end, fine)
 
     def _descended(self, views: DepthViews, start: _End, stages: Sequence[Stage]) -> _End:
