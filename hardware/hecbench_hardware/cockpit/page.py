@@ -9,6 +9,7 @@ from queue import SimpleQueue
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hecbench.errors import HecbenchError
 from hecbench.running.isolation import Ended, Worker
@@ -21,6 +22,7 @@ from hecbench_hardware.cockpit.session import FEWEST, Now, Session
 from hecbench_hardware.cockpit.suggestion import Suggestion
 from hecbench_hardware.robots.typed import CONVENTIONS, TypedRobot
 
+_CORNER_OF_WIDTH, _CONTOUR_OF_WIDTH = 300, 1000
 _log = logging.getLogger(__name__)
 
 Finish = Callable[[Session], Verdict]
@@ -101,8 +103,7 @@ class Page:
 
     def _show(self, now: Now) -> None:
         self._now = now
-        image = now.image if now.seen is None else marked(now.image, now.seen)
-        self._picture.image = small(image)
+        self._picture.image = small(self._marked(now))
         self._seen.content = texts.now(now, self.session.cell.target is not None)
         if now.state is not None:
             self._scene.show_robot(now.state.joints_rad, now.state.base_T_flange)
@@ -111,6 +112,13 @@ class Page:
         self._pointing.show(now)
         if self._automatic.value and self.session.worth_taking(now):
             self._say(self._take)
+
+    def _marked(self, now: Now) -> NDArray[np.uint8]:
+        """The picture with the target's corners, or with the robot's contour where there is no target."""
+        if now.seen is not None:
+            return marked(now.image, now.seen.corners_px, _CORNER_OF_WIDTH)
+        contour = self.session.outline(now)
+        return now.image if contour is None else marked(now.image, contour, _CONTOUR_OF_WIDTH)
 
     def _say(self, work: Work) -> None:
         """Do something and say how it ended, where it has something to say."""

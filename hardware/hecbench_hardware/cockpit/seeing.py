@@ -14,7 +14,7 @@ from hecbench.se3 import Array
 
 _FOCAL_IN_WIDTHS = 1.2
 """Of a camera whose K is not known: only where the target is seen is used then."""
-_CORNER_RGB, _CORNER_PX = (255, 60, 60), 2
+_MARK_RGB = (255, 60, 60)
 _WIDEST_PX = 640
 
 
@@ -60,14 +60,14 @@ def look_for(cell: Recording, image: ImageSource) -> Seen | None:
     return Seen(found.corners_px[0], poses[0] if usable and poses is not None else None)
 
 
-def marked(image: NDArray[np.uint8], seen: Seen) -> NDArray[np.uint8]:
-    """A copy of the image with the corners marked, so large that they are seen in a `small` one."""
+def marked(image: NDArray[np.uint8], pixels: Array, of_width: int) -> NDArray[np.uint8]:
+    """A copy of the image with pixels (P, 2) marked in squares of a share of its width; NaN are left out."""
     picture = image.copy()
     height, width = picture.shape[:2]
-    reach = max(_CORNER_PX, width // 300)
-    for u, v in seen.corners_px[np.isfinite(seen.corners_px).all(1)].round().astype(int):
-        rows = slice(max(v - reach, 0), min(v + reach + 1, height))
-        picture[rows, max(u - reach, 0) : min(u + reach + 1, width)] = _CORNER_RGB
+    reach = max(1, width // of_width)
+    for u, v in pixels[np.isfinite(pixels).all(1)].round().astype(int):
+        rows = slice(max(v - reach, 0), max(min(v + reach + 1, height), 0))
+        picture[rows, max(u - reach, 0) : max(min(u + reach + 1, width), 0)] = _MARK_RGB
     return picture
 
 

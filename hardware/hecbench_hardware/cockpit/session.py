@@ -18,6 +18,7 @@ from hecbench.se3 import Array
 from hecbench.verdict import Verdict
 from hecbench_hardware.cockpit import coverage, suggestion
 from hecbench_hardware.cockpit.coverage import Coverage
+from hecbench_hardware.cockpit.outline import Outline
 from hecbench_hardware.cockpit.pointing import Pointer
 from hecbench_hardware.cockpit.seeing import Seen, look_for
 from hecbench_hardware.cockpit.suggestion import Reach, Suggestion
@@ -79,6 +80,7 @@ class Session:
     verdict: Verdict | None = field(default=None, init=False)
     _seen: dict[str, Seen | None] = field(default_factory=dict, init=False)
     _view: RobotView | None = field(default=None, init=False)
+    _outline: Outline | None = field(default=None, init=False)
     _lock: RLock = field(default_factory=RLock, init=False)
 
     def __post_init__(self) -> None:
@@ -181,6 +183,18 @@ class Session:
             if fit is not None:
                 return fit.state.parent_T_camera
         return self.cell.initial_parent_T_camera
+
+    def outline(self, now: Now) -> Array | None:
+        """Pixels (P, 2) of the robot's contour by the best guess; None in a cell with a target, or without a guess."""
+        if self.cell.target is not None or now.state is None or not np.isfinite(now.state.joints_rad).all():
+            return None
+        with self._lock:
+            guess = self.parent_T_camera()
+            if guess is None or self.cell.present.camera.K is None:
+                return None
+            if self._outline is None:
+                self._outline = Outline(self.cell)
+            return self._outline.pixels(now.state.joints_rad, guess)
 
     def suggest(self) -> Suggestion | None:
         """Where to go next, at first the cell's first sample; None where nothing is known that would say."""

@@ -32,6 +32,7 @@ MARGIN = 0.05
 _LOOKS = 300
 _WANDER_RAD = np.array([1.5, 0.6, 0.6, 1.2, 1.2, 3.0])
 """How far candidates for views of the robot go from the first sample's joints."""
+_HOW = {"initial_parent_T_camera": ", or give it with --init"}
 
 
 class Criterion(StrEnum):
@@ -128,7 +129,7 @@ def informative_plan(
     ):
         if value is None:
             raise InputError(
-                f"{cell.name}: planning views of the robot needs {name}, roughly; add it to the cell"
+                f"{cell.name}: planning views of the robot needs {name}, roughly; add it to the cell{_HOW.get(name, '')}"
             )
     view, start = next_view.RobotView(cell), six_joints(cell.present.joints_rad[0])
     free = free_around(start, _LOOKS, arm, start, limits, rng)
@@ -189,7 +190,9 @@ def _seed(cell: Recording, arm: Arm) -> tuple[Array, Array, Array, Array]:
     }
     for name, value in needed.items():
         if value is None:
-            raise InputError(f"{cell.name}: planning poses needs {name}, roughly; add it to the cell")
+            raise InputError(
+                f"{cell.name}: planning poses needs {name}, roughly; add it to the cell{_HOW.get(name, '')}"
+            )
     start, seen = six_joints(present.joints_rad[0]), present.camera_T_target[0]
     hand = hand_poses(cell.mounting, arm.forward(start))
     return (

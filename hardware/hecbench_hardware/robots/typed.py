@@ -138,7 +138,8 @@ class TypedRobot:
 
 
 def _numbers(text: str) -> Array:
-    words = "".join(" " if sign in ",;[](){}\n\t" else sign for sign in text).split()
+    bare = text.strip().removeprefix("p") if text.strip().startswith("p[") else text  # URScript writes p[...]
+    words = "".join(" " if sign in ",;[](){}\n\t" else sign for sign in bare).split()
     try:
         numbers = np.array([float(word) for word in words])
     except ValueError:

@@ -106,6 +106,22 @@ def test_a_cell_without_a_target_is_shown_by_its_joints(recorded, open_session, 
     assert np.abs(blind.suggest().joints_rad - blind.cell.joints_rad[0]).max() > 0.3
 
 
+def test_without_a_target_the_robots_contour_is_in_the_picture(recorded, open_session, tmp_path):
+    truth = recorded.camera.base_T_camera
+    cell = replace(recorded.cell, target=None, initial_parent_T_camera=truth)
+    session = open_session(tmp_path / "outlined", cell=cell)
+    now = session.look()
+    mask = session.camera.eye.mask(truth)
+    contour = session.outline(now).round().astype(int)
+    inside = contour[(contour >= 2).all(1) & (contour < np.array(mask.shape[::-1]) - 2).all(1)]
+    shifts = np.mgrid[-2:3, -2:3].reshape(2, -1)
+    near = mask[inside[:, 1] + shifts[0][:, None], inside[:, 0] + shifts[1][:, None]]
+    assert len(inside) > 500
+    assert (near.any(0) & ~near.all(0)).mean() > 0.9  # the tag hides a part of the hand
+    assert recorded.outline(now) is None
+    assert session.outline(replace(now, state=None)) is None
+
+
 def test_pointing_finds_what_the_camera_sees(recorded):
     truth = recorded.camera.base_T_camera
     covariance = np.diag([1e-6] * 6)
