@@ -7,6 +7,7 @@ one the robot's contour tells the camera (`hecbench.next_view`), and candidates 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 
@@ -123,14 +124,13 @@ def informative_plan(
     Raises:
         InputError: The cell lacks something, or fewer than `count` poses can be reached and seen.
     """
-    for name, value in (
-        ("initial_parent_T_camera", cell.initial_parent_T_camera),
-        ("samples[0].joints_rad", cell.joints_rad),
-    ):
-        if value is None:
-            raise InputError(
-                f"{cell.name}: planning views of the robot needs {name}, roughly; add it to the cell{_HOW.get(name, '')}"
-            )
+    _require(
+        cell,
+        {
+            "initial_parent_T_camera": cell.initial_parent_T_camera,
+            "samples[0].joints_rad": cell.joints_rad,
+        },
+    )
     view, start = next_view.RobotView(cell), six_joints(cell.present.joints_rad[0])
     free = free_around(start, _LOOKS, arm, start, limits, rng)
     if len(free) < count:
@@ -178,6 +178,14 @@ def free_around(
     return [joints for joints in drawn if free_path(arm, here, joints, limits)]
 
 
+def _require(cell: Recording, needed: Mapping[str, object]) -> None:
+    for name, value in needed.items():
+        if value is None:
+            raise InputError(
+                f"{cell.name}: planning needs {name}, roughly; add it to the cell{_HOW.get(name, '')}"
+            )
+
+
 def _seed(cell: Recording, arm: Arm) -> tuple[Array, Array, Array, Array]:
     """camera_T_target, parent_T_camera, carrier_T_target (4, 4) and joints (6,) of the first sample."""
     present = cell.present
@@ -188,11 +196,7 @@ def _seed(cell: Recording, arm: Arm) -> tuple[Array, Array, Array, Array]:
         "samples[0].joints_rad": cell.joints_rad,
         "samples[0].camera_T_target": cell.camera_T_target,
     }
-    for name, value in needed.items():
-        if value is None:
-            raise InputError(
-                f"{cell.name}: planning poses needs {name}, roughly; add it to the cell{_HOW.get(name, '')}"
-            )
+    _require(cell, needed)
     start, seen = six_joints(present.joints_rad[0]), present.camera_T_target[0]
     hand = hand_poses(cell.mounting, arm.forward(start))
     return (
