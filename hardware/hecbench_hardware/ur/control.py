@@ -80,7 +80,7 @@ class Control:
             return self.worker.request(method, *args, deadline_s=deadline_s)
         except WorkerGone as error:
             self._on_fault(Fault.LINK_LOST)
-            self._fault = self._fault or DeviceFault(Fault.LINK_LOST, self._name, str(error))
+            self._fault = self._fault or recovery.explained(self._name, str(error))
             raise self._stream.fault or self._fault from None
 
     def run(

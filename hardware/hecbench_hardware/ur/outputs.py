@@ -29,10 +29,13 @@ class Outputs:
 
     def call(self, name: str, *args: object) -> None:
         """A method of RTDEIOInterface; raises `DeviceFault` when it was not done."""
+        if self._worker is None:
+            raise DeviceFault(Fault.LINK_LOST, self._device, f"{name} was not done: the link is gone")
         try:
-            done = self._worker is not None and self._worker.request("call", name, *args)
-        except WorkerGone:
-            self._worker, done = None, False
+            done = self._worker.request("call", name, *args)
+        except WorkerGone as error:
+            self._worker = None
+            raise explained(self._device, str(error)) from None
         if not done:
             raise DeviceFault(Fault.LINK_LOST, self._device, f"{name} was not done")
 

@@ -78,8 +78,8 @@ class Worker:
         """Ask for one method and wait for its result, at most `deadline_s` times the leniency and a little.
 
         Raises:
-            WorkerGone: The worker ended, or did not answer and was ended.
-            HecbenchError: The client refused, in its own words.
+            WorkerGone: The worker ended, did not answer, or lost its link, and was ended.
+            HecbenchError: There is no such call, or not with these arguments.
         """
         deadline_s *= self._leniency
         with self._lock:
@@ -90,11 +90,14 @@ class Worker:
                 while number != self._number:  # an interrupted request leaves its answer behind
                     if not self.connection.poll(deadline_s + _GRACE_S):
                         raise EOFError
-                    number, fine, result = self.connection.recv()
+                    number, outcome, result = self.connection.recv()
             except (EOFError, OSError):
                 self.end()
                 raise WorkerGone(f"{' '.join([name, *map(str, args[:1])])} had no answer") from None
-        if not fine:
+        if outcome == worker.BROKEN:
+            self.end()
+            raise WorkerGone(f"{name}: {' '.join(result.split())}")
+        if outcome == worker.REFUSED:
             raise HecbenchError(str(result))
         return result
 

@@ -178,6 +178,7 @@ class Outputs:
         """The outputs stay as they are."""
 
 
+DONE, REFUSED, BROKEN = "done", "refused", "broken"
 CLIENTS: dict[str, type[Control] | type[Outputs]] = {"control": Control, "outputs": Outputs}
 
 
@@ -218,12 +219,18 @@ def serve(
 
 def _answer(
     client: Control | Outputs, name: str, args: tuple[Any, ...], deadline_s: float
-) -> tuple[bool, Any]:
+) -> tuple[str, Any]:
+    """What became of a call, and its result or the reason.
+
+    ur_rtde raises a RuntimeError when a link breaks under a call ("End of file"); after that it is good for nothing.
+    """
     try:
         with ends_after(deadline_s):
-            return True, getattr(client, name)(*args)
-    except (RuntimeError, TypeError, AttributeError) as error:
-        return False, str(error)
+            return DONE, getattr(client, name)(*args)
+    except (TypeError, AttributeError, ValueError, IndexError) as error:
+        return REFUSED, str(error)
+    except (RuntimeError, OSError) as error:
+        return BROKEN, str(error)
 
 
 def receive(host: str, connection: Connection, leniency: float) -> Any:
