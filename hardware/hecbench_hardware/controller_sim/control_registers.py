@@ -53,10 +53,14 @@ class ControlRegisters:
 
     def forget(self) -> None:
         """Show no result any more."""
+        self.forget_numbers()
+        self.put_int(0)
+
+    def forget_numbers(self) -> None:
+        """Show none but an integer."""
         for index in self.shown:
             self.arm.io.outputs.doubles[self.register(index)] = nan
         self.shown.clear()
-        self.put_int(0)
 
     def is_fresh(self) -> bool:
         """Whether the client wrote its command just now."""

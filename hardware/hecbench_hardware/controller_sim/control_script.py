@@ -1,7 +1,8 @@
 """The control script of the ur_rtde client, done here instead of interpreted: a command number in, its result out.
 
-One pass per cycle, as the script makes one. A result stays in the output registers until its question is over,
-then they hold NaN: a client that reads too early finds no answer, never the answer to another question.
+One pass per cycle, as the script makes one. A result stays in the output registers for a while after its question is
+over, at most until the next one; then they hold NaN: a client that reads too early finds no answer, never the answer to
+another question.
 """
 
 from __future__ import annotations
@@ -30,7 +31,9 @@ _LEAVE = 255
 _REPEATED: Final = frozenset({6, 9, 10, 11, 24, 25, 26, 27, 38, 58, *range(66, 72)})
 """Commands that the script runs in every cycle while their number stays in the register."""
 _HOLD_CYCLES = 10
-"""How long a result stays after the client took its question back."""
+"""How long numbers stay after the client took its question back."""
+_HOLD_VERDICT_S = 0.1
+"""How long a verdict does, by the clock of the client's computer: no busy client may take its absence for a no."""
 _NUMBER = r"[-+0-9.eE]+"
 _MOVE = re.compile(rf"move([jlp])\((p?)\[([^\]]*)\],\s*a=({_NUMBER}),\s*v=({_NUMBER})")
 _SERVO_DECELERATION_RAD_S2 = 10.0
@@ -51,7 +54,7 @@ class ControlScript(ControlRegisters):
         self._servo_target = self._speed_target = self._speed_now = np.zeros(6)
         self._speed_acceleration = 0.0
         self._speed_of_tool = False
-        self._shown_cycles = 0
+        self._asked_s = -np.inf
         self.waypoint: Array | None = None
         """Where the present motion goes, as a pose vector."""
         self.contact_cycles: int | None = None
@@ -75,31 +78,37 @@ class ControlScript(ControlRegisters):
             yield
 
     def _loop(self) -> Motion:
-        executed = False
+        last = cycles = 0
         while True:
             command = self.arm.io.inputs.ints[self.register(0)]
-            if command == 0:
-                executed = False
-                self._shown_cycles += 1
-                if not self.shown or self._shown_cycles > _HOLD_CYCLES:
-                    self.forget()
-                    self.set_state(READY)
-            elif command == _LEAVE:
+            if command == _LEAVE:
                 return
-            elif command in _REPEATED:
-                if self.is_fresh():
-                    yield from self._execute(command)
-                else:
+            is_new, last = command != last, command
+            if command == 0:
+                cycles += 1
+                if cycles > _HOLD_CYCLES or not self.shown:
+                    self.forget_numbers()
+                    self.set_state(READY)
+                if self.runner.wall_s - self._asked_s > _HOLD_VERDICT_S:
+                    self.put_int(0)
+            else:
+                cycles = 0
+                if is_new:
                     self.forget()
-                self.set_state(READY)
-            elif not executed:
-                yield from self._execute(command)
-                self.set_state(DONE)
-                executed = True
+                if command in _REPEATED:
+                    if self.is_fresh():
+                        yield from self._execute(command)
+                    else:
+                        self.forget()
+                    self.set_state(READY)
+                else:
+                    if is_new:
+                        yield from self._execute(command)
+                        self.set_state(DONE)
+                    self._asked_s = self.runner.wall_s
             yield
 
     def _execute(self, command: int) -> Motion:
-        self._shown_cycles = 0
         if command in (1, 2, 3, 4, 45):
             self._stop_async_move()
             yield from self._start(self._motion(command))
