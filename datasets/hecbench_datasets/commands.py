@@ -6,11 +6,20 @@ from pathlib import Path
 
 import click
 
+from hecbench.commands import completion
+
 
 @click.command()
 @click.argument("root", type=click.Path(path_type=Path, file_okay=False), metavar="ROOT")
 @click.option("--camera", help="Its key, such as observation.images.top; default: the only one.")
-@click.option("--solver", "solvers", multiple=True, metavar="NAME", help="Default: render_gn_free.")
+@click.option(
+    "--solver",
+    "solvers",
+    multiple=True,
+    metavar="NAME",
+    shell_complete=completion.plugins("solver"),
+    help="Default: render_gn_free.",
+)
 @click.option(
     "--out", type=click.Path(path_type=Path, file_okay=False), help="Default: ROOT_cameras beside the set."
 )

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from hecbench.commands import completion
 from hecbench.commands.devices import device_settings, open_device
 from hecbench.errors import InputError
 
@@ -37,11 +38,17 @@ def controller(host: str, model: str, time_scale: float) -> None:
 @click.option(
     "--out", type=_folder, required=True, help="Folder of the recording; an unfinished one goes on."
 )
-@click.option("--robot", default="sim_ur5e", show_default=True)
+@click.option("--robot", default="sim_ur5e", show_default=True, shell_complete=completion.plugins("robot"))
 @click.option("--host", help="Address of the controller.")
 @click.option("--arm", is_flag=True, help="Let a robot that is not simulated move, after a question.")
 @click.option("--limits", type=_file, help="JSON file of limits; see docs/hardware-safety.md.")
-@click.option("--camera", default="none", show_default=True, help="none records poses only.")
+@click.option(
+    "--camera",
+    default="none",
+    show_default=True,
+    shell_complete=completion.plugins("camera"),
+    help="none records poses only.",
+)
 @click.option(
     "--set", "settings", multiple=True, metavar="DEVICE.NAME=VALUE", help="E.g. camera.folder=images."
 )

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from hecbench.commands import completion
 from hecbench.errors import InputError
 
 if TYPE_CHECKING:
@@ -23,16 +24,29 @@ _path = click.Path(path_type=Path)
 
 _OPTIONS = [
     click.option("--estimate", "estimates", type=_path, multiple=True, help="Estimate file or folder of a run."),
-    click.option("--solver", "solvers", multiple=True, metavar="NAME", help="Only these of a folder."),
+    click.option(
+        "--solver",
+        "solvers",
+        multiple=True,
+        metavar="NAME",
+        shell_complete=completion.plugins("solver"),
+        help="Only these of a folder.",
+    ),
     click.option("--offset-mm", type=click.FloatRange(min=0), help="Instead: the true calibrations, moved."),
-    click.option("--robot", default="lab", show_default=True, help="lab, sim_ur5e, or a real arm."),
+    click.option(
+        "--robot",
+        default="lab",
+        show_default=True,
+        shell_complete=completion.plugins("robot"),
+        help="lab, sim_ur5e, or a real arm.",
+    ),
     click.option("--station", default="ur5e", show_default=True, help="The lab's arm: ur5e or vs060."),
     click.option("--urdf", help="URDF of the vs060."),
     click.option("--host", help="Address of the controller."),
     click.option("--arm", is_flag=True, help="Let a robot that is not simulated move, after a question."),
     click.option("--calibration", type=click.IntRange(min=0), help="Which of the lab's calibrations it is."),
-    click.option("--camera", help="Camera of a real cell."),
-    click.option("--gripper", help="Gripper of a real cell."),
+    click.option("--camera", shell_complete=completion.plugins("camera"), help="Camera of a real cell."),
+    click.option("--gripper", shell_complete=completion.plugins("gripper"), help="Gripper of a real cell."),
     click.option("--set", "settings", multiple=True, metavar="DEVICE.NAME=VALUE", help="E.g. robot.time_scale=300."),
     click.option("--places", type=click.IntRange(min=1), default=3, show_default=True, help="Of a real cell."),
     click.option("--trials", type=click.IntRange(min=1), help="At most so many for each method."),

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from hecbench.commands import completion
 from hecbench.system import cache
 from hecbench.system import threads as most_threads
 
@@ -23,6 +24,7 @@ solvers = click.option(
     "solvers",
     multiple=True,
     metavar="NAME",
+    shell_complete=completion.plugins("solver"),
     help="Repeatable; NAME[OPTION=VALUE,...] sets options of it; default: all that can.",
 )
 unknown = click.option(
@@ -32,7 +34,10 @@ unknown = click.option(
     help="Solve for this too, by every solver with the option `unknown`; repeatable.",
 )
 segmenter = click.option(
-    "--segmenter", metavar="NAME", help="Whose masks of the robot are used; default: those of the recording."
+    "--segmenter",
+    metavar="NAME",
+    shell_complete=completion.plugins("segmenter"),
+    help="Whose masks of the robot are used; default: those of the recording.",
 )
 FOLDER = click.Path(path_type=Path, file_okay=False)
 FILE = click.Path(path_type=Path, dir_okay=False)

@@ -17,7 +17,7 @@ from pathlib import Path
 import click
 
 from hecbench import __version__
-from hecbench.commands import choices, console
+from hecbench.commands import choices, completion, console
 from hecbench.commands.calibrate import calibrate
 from hecbench.commands.robot import robot
 from hecbench.commands.run import demo, run
@@ -133,7 +133,7 @@ def report(folder: Path, as_json: bool) -> None:
 
 
 @cli.command()
-@click.argument("name")
+@click.argument("name", shell_complete=completion.plugins())
 @click.option("--kind", help="Of plugins of one name, the one of this kind: solver, segmenter, dataset, ...")
 @choices.as_json
 def conformance(name: str, kind: str | None, as_json: bool) -> None:
@@ -221,7 +221,11 @@ def render(recording: Path, answer: Path, out: Path | None) -> None:
 @click.argument("source", type=choices.ANY_PATH, metavar="SRC")
 @click.argument("destination", type=choices.FOLDER, metavar="DEST")
 @click.option(
-    "--format", "format_name", metavar="F", help="A dataset of `hecbench plugins`; default: recognised."
+    "--format",
+    "format_name",
+    metavar="F",
+    shell_complete=completion.plugins("dataset"),
+    help="A dataset of `hecbench plugins`; default: recognised.",
 )
 @click.option("--urdf", type=choices.FILE, help="The robot's model; it is copied with its meshes into DEST.")
 def import_recording(source: Path, destination: Path, format_name: str | None, urdf: Path | None) -> None:
@@ -247,7 +251,14 @@ def import_recording(source: Path, destination: Path, format_name: str | None, u
 
 @cli.command()
 @click.argument("estimate", type=choices.ANY_PATH)
-@click.option("--to", "format_name", required=True, metavar="F", help="An exporter of `hecbench plugins`.")
+@click.option(
+    "--to",
+    "format_name",
+    required=True,
+    metavar="F",
+    shell_complete=completion.plugins("exporter"),
+    help="An exporter of `hecbench plugins`.",
+)
 @click.option("--out", type=choices.FILE, help="Write to this file instead of stdout.")
 @click.option("--parent", help="Name of the parent frame; default: the estimate's.")
 @click.option("--child", help="Frame to place, such as camera_link; default: the optical frame itself.")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from hecbench.commands import choices, console
+from hecbench.commands import choices, completion, console
 from hecbench.errors import InputError
 
 if TYPE_CHECKING:
@@ -60,7 +60,13 @@ def demo(out: Path, samples: int, seed: int) -> None:
 
 
 @click.command()
-@click.argument("sources", nargs=-1, required=True, metavar="SUITE|RECORDING...")
+@click.argument(
+    "sources",
+    nargs=-1,
+    required=True,
+    metavar="SUITE|RECORDING...",
+    shell_complete=completion.plugins("suite", and_files=True),
+)
 @choices.solvers
 @choices.segmenter
 @click.option(

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from hecbench.commands import choices
+from hecbench.commands import choices, completion
 from hecbench.commands.devices import device_settings, open_robot_and_camera
 from hecbench.errors import InputError
 
@@ -34,8 +34,16 @@ _TICK_S, _REST_S = 0.2, 0.05
 @click.option(
     "--out", type=choices.FOLDER, help="Of the recording; an unfinished one goes on. Default: out/cockpit."
 )
-@click.option("--robot", help="A robot of `hecbench plugins`, or `typed`. Default: chosen on the page.")
-@click.option("--camera", help="A camera of `hecbench plugins`. Default: chosen on the page.")
+@click.option(
+    "--robot",
+    shell_complete=completion.plugins("robot"),
+    help="A robot of `hecbench plugins`, or `typed`. Default: chosen on the page.",
+)
+@click.option(
+    "--camera",
+    shell_complete=completion.plugins("camera"),
+    help="A camera of `hecbench plugins`. Default: chosen on the page.",
+)
 @click.option("--host", help="Address of the robot's controller.")
 @click.option("--arm", is_flag=True, help="Let a robot that is not simulated move, after a question here.")
 @click.option("--freedrive", is_flag=True, help="Guide the arm by hand all the time; it is not driven then.")

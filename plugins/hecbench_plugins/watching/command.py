@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 import msgspec
 
-from hecbench.commands import choices
+from hecbench.commands import choices, completion
 from hecbench.errors import InputError
 
 if TYPE_CHECKING:
@@ -35,8 +35,12 @@ Frames = Iterator[tuple["NDArray[np.uint8]", "Array"]]
 @click.option(
     "--limit-mm", type=click.FloatRange(min=0, min_open=True), help="Displacement that is an alarm."
 )
-@click.option("--camera", help="A device that gives the frames, instead of the recording's pictures.")
-@click.option("--robot", help="The device that gives the joints.")
+@click.option(
+    "--camera",
+    shell_complete=completion.plugins("camera"),
+    help="A device that gives the frames, instead of the recording's pictures.",
+)
+@click.option("--robot", shell_complete=completion.plugins("robot"), help="The device that gives the joints.")
 @click.option("--host", help="Address of the controller.")
 @click.option("--set", "settings", multiple=True, metavar="DEVICE.NAME=VALUE", help="E.g. camera.index=1.")
 @click.option(
