@@ -8,6 +8,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from hecbench import se3
+from hecbench.errors import InputError
 from hecbench.preparation import load_recording, with_robot_poses
 from hecbench.recording import Mounting
 
@@ -250,3 +251,35 @@ def test_layouts_are_imported(tmp_path, recordings, layout):
     if read.images is not None:
         for i, k in enumerate(order):
             np.testing.assert_array_equal(read.image(i), recording.image(k))
+
+
+def named_by_row(root, r, names):
+    """Pictures and a table with their names, in quaternions."""
+    root.mkdir(exist_ok=True)
+    (root / "K.txt").write_text(K)
+    (root / "hecbench-import.yaml").write_text(HINTED[HAND] or CHESSBOARD)
+    pictures(root / "images", r)
+    table = [(name, *row) for name, row in zip(names, quaternion(r.base_T_flange), strict=True)]
+    (root / "poses.csv").write_text(lines(table, head=["image", "x", "y", "z", "qx", "qy", "qz", "qw"]))
+
+
+def test_a_row_whose_picture_is_absent_is_left_out_and_said(tmp_path, recordings):
+    r = recordings[HAND]
+    named_by_row(tmp_path, r, [f"{i:02d}.png" for i in range(len(r))])
+    (tmp_path / "images" / "00.png").unlink()
+    read = load_recording(tmp_path)
+    assert len(read) == len(r) - 1
+    assert f"left out 1 of {len(r)} rows, whose pictures are not there: 00.png" in "\n".join(read.notes)
+
+
+def test_one_picture_for_two_poses_and_two_for_one_are_refused(tmp_path, recordings):
+    r = recordings[HAND]
+    named_by_row(tmp_path / "one", r, [f"{i // 2:02d}.png" for i in range(len(r))])
+    with pytest.raises(InputError, match=r"00\.png stands in several rows, one picture for two poses"):
+        load_recording(tmp_path / "one")
+    (tmp_path / "two").mkdir()
+    for name in ("a", "b"):
+        pictures(tmp_path / "two" / name, r)
+    (tmp_path / "two" / "poses.txt").write_text(lines(quaternion(r.base_T_flange), " "))
+    with pytest.raises(InputError, match=r"both hold \d+ pictures, two for one pose; write 'images: "):
+        load_recording(tmp_path / "two")

@@ -51,6 +51,7 @@ def load_beside_pictures(
     """
     beside = _paired(found, stream, poses, hints)
     camera, notes = _camera(found, beside.images[0], hints)
+    notes += _absent(beside)
     target = hinted_target(hints, file) or kalibr.target_in(found.files, notes)
     robots = _robots(found, hints)
     told = hints.mounting is not None and (hints.robot_rotation is not None or _is_matrix(poses))
@@ -157,6 +158,18 @@ def _by_name(stream: Columns, pictures: list[Path]) -> tuple[list[int], list[Pat
             f"{stream.source}: {min(twice).name} stands in several rows, one picture for two poses; keep one"
         )
     return rows, images
+
+
+def _absent(beside: Beside) -> list[str]:
+    """What is said of rows whose picture is not there."""
+    named = beside.stream.images or ()
+    absent = [named[row] for row in range(len(named)) if row not in set(beside.rows)]
+    if not absent:
+        return []
+    shown = ", ".join(absent[:3]) + (", ..." if len(absent) > 3 else "")
+    return [
+        f"{beside.stream.source}: left out {len(absent)} of {len(named)} rows, whose pictures are not there: {shown}"
+    ]
 
 
 _WORDS = re.compile(r"depth|colou?r|rgb|image|aligned|raw", re.IGNORECASE)
