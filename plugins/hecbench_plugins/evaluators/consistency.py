@@ -12,7 +12,7 @@ from hecbench.lens import normalised
 from hecbench.recording import CameraModel, Recording
 from hecbench.registry import hookimpl
 from hecbench.se3 import Array
-from hecbench.specs import Column, EvaluatorSpec, Need, ResultSection
+from hecbench.specs import EvaluatorSpec, Need, ResultSection
 from hecbench_plugins.markers.hand_eye import PosedSamples, carrier_T_target_per_sample, rotation_spread_deg
 
 _LEAST_RAYS = 3
@@ -108,12 +108,6 @@ def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
     yield EvaluatorSpec(
         name="consistency",
         summary="spread of the target's pose; reconstruction of the target's points",
-        columns=(
-            Column("target_spread_deg", "deg"),
-            Column("target_spread_mm", "mm"),
-            Column("rae_mm", "mm"),
-            Column("rae_mean_square_mm2", "mm2"),
-        ),
         factory=lambda: consistency,
         into=ResultSection.DIAGNOSTICS,
         applies=lambda recording: (

@@ -13,7 +13,7 @@ from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.samples.standstills import folds, pose_labels
 from hecbench.se3 import Array
-from hecbench.specs import Column, EvaluatorSpec, Need, ResultSection
+from hecbench.specs import EvaluatorSpec, Need, ResultSection
 
 FOLDS = 5
 _NEEDS = frozenset({Need.IMAGES, Need.ROBOT_MODEL, Need.JOINTS, Need.INTRINSICS})
@@ -92,7 +92,6 @@ def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
         name="contour_held_out",
         summary="the robot's contour in left-out photographs, where there is neither a target nor a mask",
         imports=("cv2",),
-        columns=(Column("contour_px", "px"), Column("confirmed", "", False)),
         factory=lambda: of_left_out_photographs,
         into=ResultSection.HELD_OUT,
         applies=_applies,

@@ -15,11 +15,10 @@ from hecbench.recording import CameraModel, Recording
 from hecbench.registry import hookimpl
 from hecbench.samples.standstills import folds, pose_labels
 from hecbench.se3 import Array
-from hecbench.specs import Column, EvaluatorSpec, Need, ResultSection
+from hecbench.specs import EvaluatorSpec, Need, ResultSection
 from hecbench_plugins.markers.target_poses import project, target_poses
 
 FOLDS = 5
-_COLUMNS = (Column("reprojection_px", "px"), Column("target_mm", "mm"), Column("target_deg", "deg"))
 
 
 def held_out(
@@ -135,7 +134,6 @@ def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
     yield EvaluatorSpec(
         name="held_out",
         summary="prediction of left-out samples",
-        columns=_COLUMNS,
         factory=lambda: held_out,
         into=ResultSection.HELD_OUT,
         applies=lambda recording: (

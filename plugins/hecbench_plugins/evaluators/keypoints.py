@@ -20,7 +20,7 @@ from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.robots.posed import PosedRobot
 from hecbench.se3 import Array
-from hecbench.specs import Column, EvaluatorSpec, Need, ResultSection
+from hecbench.specs import EvaluatorSpec, Need, ResultSection
 from hecbench.targets import PointsTarget
 from hecbench_plugins.markers.target_poses import MINIMUM_POINTS, project
 
@@ -139,14 +139,6 @@ def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
     yield EvaluatorSpec(
         name="pck",
         summary="keypoints of the robot predicted in the picture (PCK)",
-        columns=(
-            Column("keypoints", "", None),
-            Column("keypoint_poses", "", None),
-            Column("keypoint_mean_px", "px"),
-            Column("keypoint_median_px", "px"),
-            Column("keypoint_auc", "", False),
-            *(Column(f"pck_{threshold}_px", "", False) for threshold in THRESHOLDS_PX),
-        ),
         factory=lambda: pck,
         into=ResultSection.DIAGNOSTICS,
         applies=has_keypoints,
@@ -154,7 +146,6 @@ def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
     yield EvaluatorSpec(
         name="add",
         summary="keypoints of the robot away from where the truth has them (ADD)",
-        columns=(Column("add_mm", "mm"), Column("add_auc_400_mm", "", False)),
         factory=lambda: add,
         into=ResultSection.ERRORS,
         applies=lambda recording: recording.truth_parent_T_camera is not None and has_keypoints(recording),
@@ -162,7 +153,6 @@ def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
     yield EvaluatorSpec(
         name="links_add",
         summary="origins of the robot's links away from where the truth has them (ADD)",
-        columns=(Column("links_add_mm", "mm"), Column("links_add_auc_100_mm", "", False)),
         factory=lambda: links_add,
         into=ResultSection.ERRORS,
         applies=lambda recording: (

@@ -17,7 +17,7 @@ from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.samples.standstills import folds, pose_labels
 from hecbench.se3 import Array
-from hecbench.specs import Column, EvaluatorSpec, Need, ResultSection
+from hecbench.specs import EvaluatorSpec, Need, ResultSection
 
 FOLDS = 5
 _NEEDS = frozenset({Need.MASKS, Need.ROBOT_MODEL, Need.JOINTS, Need.INTRINSICS})
@@ -108,7 +108,6 @@ def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
     yield EvaluatorSpec(
         name="mask_iou",
         summary="overlap of the robot drawn at the answer with the masks",
-        columns=(Column("mask_iou", "", False), Column("mask_iou_least", "", False)),
         factory=lambda: of_answer,
         into=ResultSection.DIAGNOSTICS,
         applies=_drawable,
@@ -116,7 +115,6 @@ def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
     yield EvaluatorSpec(
         name="mask_iou_held_out",
         summary="overlap of the robot drawn in left-out views with their masks, where there is no target",
-        columns=(Column("mask_iou", "", False),),
         factory=lambda: of_left_out_views,
         into=ResultSection.HELD_OUT,
         applies=lambda recording: (
@@ -126,7 +124,6 @@ def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
     yield EvaluatorSpec(
         name="masks_iou_truth",
         summary="overlap of the masks with the robot drawn at the true camera pose",
-        columns=(Column("masks_iou_truth", "", False),),
         factory=lambda: of_masks,
         into=ResultSection.ERRORS,
         applies=lambda recording: recording.truth_parent_T_camera is not None and _drawable(recording),

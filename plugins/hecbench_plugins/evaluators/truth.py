@@ -12,7 +12,7 @@ from hecbench.lens import normalised, project, same
 from hecbench.recording import Mounting, Recording
 from hecbench.registry import hookimpl
 from hecbench.se3 import Array
-from hecbench.specs import Column, EvaluatorSpec, ResultSection
+from hecbench.specs import EvaluatorSpec, ResultSection
 from hecbench.workspace import apart_m, points_in_parent
 
 
@@ -76,13 +76,6 @@ def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
     yield EvaluatorSpec(
         name="errors",
         summary="errors against the true camera pose",
-        columns=(
-            Column("translation_error_mm", "mm"),
-            Column("rotation_error_deg", "deg"),
-            Column("camera_T_parent_translation_error_mm", "mm"),
-            Column("tre_mm", "mm"),
-            Column("pair_tre_mm", "mm"),
-        ),
         factory=lambda: errors,
         into=ResultSection.ERRORS,
         applies=lambda recording: recording.truth_parent_T_camera is not None,
