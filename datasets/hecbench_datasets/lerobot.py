@@ -80,7 +80,7 @@ def load(path: Path) -> Recording:
     units = ("rad",) if np.abs(joints).max() < _RADIANS_BELOW else ("deg",)
     reading = joint_readings(joints, names, robots or _of_type(root, info), units)
     if len(reading) > 1:
-        fitting = ", ".join(str(one.robot.source or "panda") for one in reading)
+        fitting = ", ".join(str((one.robot and one.robot.source) or "panda") for one in reading)
         raise InputError(
             f"{source}: its joints fit {fitting}; write robot: NAME or robot: FILE.urdf into {hints_file}"
         )
@@ -95,7 +95,7 @@ def load(path: Path) -> Recording:
     notes = [] if hints.mounting else [f"{source}: {camera} read as {mounting}, by its name"]
     if hints.camera is None:
         notes.append(f"{source}: no file of the set holds intrinsics: write camera into {HINTS_NAME}")
-    chosen = reading[0]
+    chosen = reading[0].at(rows)
     return Recording(
         name=f"{root.resolve().name}_{camera.split('.')[-1]}_{index:06d}",
         mounting=mounting,
@@ -103,8 +103,8 @@ def load(path: Path) -> Recording:
         robot=chosen.robot,
         camera=_camera(hints, images[0]),
         target=hinted_target(hints, hints_file),
-        base_T_flange=None if chosen.robot.source else chosen.reading.poses[rows],
-        joints_rad=chosen.joints_rad[rows],
+        base_T_flange=chosen.base_T_flange,
+        joints_rad=chosen.joints_rad,
         camera_stamp_s=told.stamps[rows],
         robot_stamp_s=told.stamps[rows],
         images=tuple(images),

@@ -10,7 +10,7 @@ from __future__ import annotations
 import atexit
 import shutil
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ import numpy as np
 from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.exchange.conventions import HINTS_NAME
-from hecbench.exchange.pose_numbers import Reading
+from hecbench.exchange.pose_numbers import PoseConvention
 from hecbench.recording import CameraModel, Mounting, Recording
 from hecbench.registry import hookimpl
 from hecbench.se3 import Array
@@ -29,8 +29,8 @@ from hecbench.storage.recording_io import encode_png
 from hecbench.system import files
 from hecbench_datasets.reading import bags, kalibr
 from hecbench_datasets.reading.hints import Hints, hinted_target, hints_for
-from hecbench_datasets.reading.joint_poses import BASES, FLANGES, joint_readings
-from hecbench_datasets.reading.pictured_proof import Way, settled
+from hecbench_datasets.reading.joint_poses import BASES, FLANGES, RobotReading, joint_readings
+from hecbench_datasets.reading.pictured_proof import settled
 from hecbench_datasets.reading.seen_targets import seen_target
 from hecbench_datasets.reading.sources import YAML_SUFFIXES, files_in, foreign
 from hecbench_datasets.reading.stills import offset_by_change_s, still_moments
@@ -96,7 +96,7 @@ def load(path: Path) -> Recording:
         folder=path if path.is_dir() else path.parent,
         notes=tuple(notes),
     )
-    return settled(path, recording, [way(rows) for way in ways], hints, as_told=target is None)
+    return settled(path, recording, [way.at(rows) for way in ways], hints, as_given=target is None)
 
 
 def _image_topic(path: Path, reader: Any, hints: Hints) -> str:
@@ -164,20 +164,14 @@ def _numbers(position: Any, turn: Any) -> list[float]:
     return [position.x, position.y, position.z, turn.x, turn.y, turn.z, turn.w]
 
 
-@dataclass(frozen=True, eq=False)
-class _Stream:
-    """One reading of the whole stream; called with rows it is the one of these."""
-
-    way: Way
-
-    def __call__(self, rows: Any) -> Way:
-        reading = self.way.reading
-        joints = None if self.way.joints_rad is None else self.way.joints_rad[rows]
-        return Way(Reading(reading.poses[rows], reading.text, reading.deviations), self.way.robot, joints)
+def _by_stamp(rows: Sequence[Sequence[float]]) -> Array:
+    """The rows in the order of their stamps, the first of equal ones."""
+    table = np.array(rows)
+    return table[np.unique(table[:, 0], return_index=True)[1]]
 
 
-def _robot(path: Path, content: _Content, hints: Hints) -> tuple[Array, Array, list[_Stream]]:
-    """Stamps (N,) s, what tells motion (N, D), and the readings of the robot's poses."""
+def _robot(path: Path, content: _Content, hints: Hints) -> tuple[Array, Array, list[RobotReading]]:
+    """Stamps (N,) s, what shows motion (N, D), and the conventions of the robot's poses."""
     frames = content.transforms.frames
     base = hints.base_link or next((name for name in BASES if name in frames), None)
     tip = hints.flange_link or next((name for name in FLANGES if name in frames), None)
@@ -188,13 +182,12 @@ def _robot(path: Path, content: _Content, hints: Hints) -> tuple[Array, Array, l
             return (
                 stamps,
                 _motion(poses),
-                [_Stream(Way(Reading(poses, f"base_T_flange of {base} and {tip}")))],
+                [RobotReading(PoseConvention(poses, f"base_T_flange of {base} and {tip}"))],
             )
         except InputError as error:
             faults.append(str(error))
     for names, rows in sorted(content.joints.items(), key=lambda item: -len(item[1])):
-        table = np.array(rows)
-        table = table[np.unique(table[:, 0], return_index=True)[1]]
+        table = _by_stamp(rows)
         robots = (
             [path.parent / hints.robot if hints.robot.endswith(".urdf") else hints.robot]
             if hints.robot
@@ -205,12 +198,15 @@ def _robot(path: Path, content: _Content, hints: Hints) -> tuple[Array, Array, l
         except InputError as error:
             faults.append(str(error))
             continue
-        return table[:, 0], table[:, 1:], [_Stream(Way(j.reading, j.robot, j.joints_rad)) for j in found]
+        return table[:, 0], table[:, 1:], found
     if content.poses:
-        table = np.array(content.poses)
-        table = table[np.unique(table[:, 0], return_index=True)[1]]
+        table = _by_stamp(content.poses)
         poses = se3.from_quat_xyzw(table[:, 4:], table[:, 1:4])
-        return table[:, 0], _motion(poses), [_Stream(Way(Reading(poses, "base_T_flange of stamped poses")))]
+        return (
+            table[:, 0],
+            _motion(poses),
+            [RobotReading(PoseConvention(poses, "base_T_flange of stamped poses"))],
+        )
     if frames:
         faults.append(
             f"its frames are {', '.join(sorted(frames)[:20])}: write base_link and flange_link into {HINTS_NAME}"
@@ -231,7 +227,7 @@ def _offset(
 ) -> tuple[float, list[str]]:
     """Seconds to add to the pictures' stamps, and how that is known."""
     if hints.time_offset_s is not None:
-        return hints.time_offset_s, [f"{path}: clock offset {hints.time_offset_s:.3f} s, as told"]
+        return hints.time_offset_s, [f"{path}: clock offset {hints.time_offset_s:.3f} s, as given"]
     pictures = np.array(content.picture_stamps)
     offset, quality = offset_by_change_s(stamps, values, pictures, np.array(content.change))
     if offset is None:

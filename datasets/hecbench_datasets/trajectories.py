@@ -133,7 +133,7 @@ def _offset(
     if hints.time_offset_s is not None:
         return (
             hints.time_offset_s,
-            f"robot poses interpolated at camera stamps + {hints.time_offset_s:.4f} s, as told",
+            f"robot poses interpolated at camera stamps + {hints.time_offset_s:.4f} s, as given",
         )
     if np.array_equal(robot_stamps, camera_stamps):
         lag = lag_s(robot_stamps, robot, camera)

@@ -15,7 +15,7 @@ import numpy as np
 
 from hecbench.errors import InputError
 from hecbench.exchange.conventions import HINTS_NAME
-from hecbench.exchange.pose_numbers import readings
+from hecbench.exchange.pose_numbers import pose_conventions
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.se3 import Array
@@ -72,7 +72,7 @@ def load(path: Path) -> Recording:
             f"{path}: has robot poses but no checkerboard_pose_in_camera_frame_*.yaml; beside pictures "
             f"(img01.png ...) give mounting and target in {HINTS_NAME}: point clouds (.zdf) are not read"
         )
-    poses = readings(
+    poses = pose_conventions(
         [_matrix(file) for file in robot.values()],
         ("base", "flange"),
         unit=hints.robot_unit,

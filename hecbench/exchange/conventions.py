@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hecbench.errors import InputError
-from hecbench.exchange.pose_numbers import Reading
+from hecbench.exchange.pose_numbers import PoseConvention
 from hecbench.exchange.stillness import (
     Stillness,
     length_factor,
@@ -61,8 +61,8 @@ class Proof:
 @dataclass(frozen=True, eq=False)
 class _Candidate:
     mounting: Mounting
-    robot: Reading
-    target: Reading
+    robot: PoseConvention
+    target: PoseConvention
     deviations: int
     stillness: Stillness
 
@@ -81,7 +81,7 @@ class _Candidate:
         short = [mine[0] if mine[1:] == its[1:] else " in ".join(mine) for mine, its in units]
         return f"{self.mounting} with {' and '.join(short)}"
 
-    def _pairs_with(self, other: _Candidate) -> tuple[tuple[Reading, Reading], ...]:
+    def _pairs_with(self, other: _Candidate) -> tuple[tuple[PoseConvention, PoseConvention], ...]:
         return (self.robot, other.robot), (self.target, other.target)
 
     @property
@@ -102,10 +102,10 @@ class _Candidate:
 
 def prove(
     source: str,
-    robot: Sequence[Reading],
-    target: Sequence[Reading],
+    robot: Sequence[PoseConvention],
+    target: Sequence[PoseConvention],
     mountings: Sequence[Mounting],
-    told: bool = False,
+    mounting_given: bool = False,
 ) -> Proof:
     """The one combination of readings that holds the target still; documented readings go first.
 
@@ -117,7 +117,7 @@ def prove(
         robot: readings as base_T_flange (N, 4, 4).
         target: readings as camera_T_target (N, 4, 4).
         mountings: the documented or possible ones; the others count as deviations.
-        told: the user vouches for the mounting; no other is tried.
+        mounting_given: the user vouches for the mounting; no other is tried.
 
     Raises:
         InputError: several readings hold it equally still (all are listed), or none is documented and none
@@ -128,9 +128,9 @@ def prove(
         raise InputError(
             f"{source}: {count} robot poses for {len(target[0].poses)} target poses; pair them up"
         )
-    candidates = list(_candidates(_usual(robot), _usual(target), mountings, told))
+    candidates = list(_candidates(_usual(robot), _usual(target), mountings, mounting_given))
     if count >= _LEAST_SAMPLES and min(c.stillness.relative for c in candidates) > _CONVINCING:
-        candidates = list(_candidates(robot, target, mountings, told))
+        candidates = list(_candidates(robot, target, mountings, mounting_given))
     documented = [c for c in candidates if c.deviations == 0]
     settled = _count(robot) * _count(target) * len(mountings) == 1
     if count < _LEAST_SAMPLES:
@@ -173,11 +173,11 @@ def _as_documented(source: str, candidates: Sequence[_Candidate], documented: Se
     )
 
 
-def _usual(stream: Sequence[Reading]) -> Sequence[Reading]:
+def _usual(stream: Sequence[PoseConvention]) -> Sequence[PoseConvention]:
     return [reading for reading in stream if not reading.unusual] or stream
 
 
-def _count(stream: Sequence[Reading]) -> int:
+def _count(stream: Sequence[PoseConvention]) -> int:
     """How many readings depart from nothing that is documented."""
     return sum(reading.deviations == 0 for reading in stream)
 
@@ -252,10 +252,15 @@ def _proof(chosen: _Candidate, note: str) -> Proof:
 
 
 def _candidates(
-    robot: Sequence[Reading], target: Sequence[Reading], mountings: Sequence[Mounting], told: bool
+    robot: Sequence[PoseConvention],
+    target: Sequence[PoseConvention],
+    mountings: Sequence[Mounting],
+    mounting_given: bool,
 ) -> Iterator[_Candidate]:
     """Combinations worth fitting: those whose rotations agree, and the one that is documented."""
-    hands = [(mounting, reading) for reading in robot for mounting in (mountings if told else Mounting)]
+    hands = [
+        (mounting, reading) for reading in robot for mounting in (mountings if mounting_given else Mounting)
+    ]
     misfits = rotation_misfits(
         [hand_poses(mounting, reading.poses) for mounting, reading in hands],
         [reading.poses for reading in target],

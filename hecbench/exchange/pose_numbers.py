@@ -48,7 +48,7 @@ _RADIANS_BELOW = 2 * np.pi + 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
+class PoseConvention:
     """One way to read a stream of poses.
 
     Attributes:
@@ -64,7 +64,7 @@ class Reading:
     unusual: bool = False
 
 
-def readings(
+def pose_conventions(
     numbers: ArrayLike,
     frames: tuple[str, str],
     *,
@@ -73,7 +73,7 @@ def readings(
     unit: str | None = None,
     inverted: bool | None = None,
     assumed_inverted: bool = False,
-) -> list[Reading]:
+) -> list[PoseConvention]:
     """Every reading of rows of numbers: position and rotation, usually in this order, or a 3x4 or 4x4 matrix.
 
     A matrix is row-major; a 4x4 whose last column is 0 0 0 1 is read as column-major.
@@ -120,7 +120,9 @@ def readings(
                 wrong_way = inverted is None and inverse != assumed_inverted
                 text = f"{a}_T_{b} {name} in {length}{order}"
                 poses_m = se3.inverse(scaled) if inverse else scaled
-                found.append(Reading(poses_m, text, unusual + wrong_way + rare + bool(order), bool(order)))
+                found.append(
+                    PoseConvention(poses_m, text, unusual + wrong_way + rare + bool(order), bool(order))
+                )
     if not found:
         raise InputError(faults[0])
     return found

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.exchange.conventions import prove
-from hecbench.exchange.pose_numbers import VENDORS, readings
+from hecbench.exchange.pose_numbers import VENDORS, pose_conventions
 from hecbench.preparation import load_recording
 from hecbench.recording import Mounting
 
@@ -58,7 +58,7 @@ def about_one_axis(count=10):
 
 def test_one_axis_without_a_documented_reading_is_refused():
     robot, target = about_one_axis()
-    streams = readings(robot, ("base", "flange")), readings(target, ("camera", "target"))
+    streams = pose_conventions(robot, ("base", "flange")), pose_conventions(target, ("camera", "target"))
     with pytest.raises(InputError, match="one axis of rotation proves no convention"):
         prove("x", *streams, list(Mounting))
     proof = prove("x", *streams, [Mounting.EYE_IN_HAND])

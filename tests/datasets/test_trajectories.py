@@ -73,7 +73,7 @@ def test_the_offset_can_be_told(tmp_path, streams):
     np.savetxt(tmp_path / "robot.csv", robot)
     np.savetxt(tmp_path / "camera.csv", camera)
     (tmp_path / "hecbench-import.yaml").write_text(f"time_offset_s: {OFFSET_S}\n")
-    assert "as told" in trajectories.load(tmp_path).notes[1]
+    assert "as given" in trajectories.load(tmp_path).notes[1]
 
 
 def test_streams_of_other_days_are_refused(tmp_path, streams):

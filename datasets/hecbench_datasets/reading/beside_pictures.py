@@ -11,15 +11,15 @@ import numpy as np
 
 from hecbench.errors import InputError
 from hecbench.exchange.conventions import HINTS_NAME
-from hecbench.exchange.pose_numbers import readings
+from hecbench.exchange.pose_numbers import pose_conventions
 from hecbench.recording import CameraModel, Mounting, Recording
 from hecbench.system import pictures
 from hecbench_datasets.reading import kalibr
 from hecbench_datasets.reading.cameras import camera_in
 from hecbench_datasets.reading.columns import Columns, Poses
 from hecbench_datasets.reading.hints import Hints, hinted_target
-from hecbench_datasets.reading.joint_poses import JointReading, joint_readings
-from hecbench_datasets.reading.pictured_proof import Way, settled
+from hecbench_datasets.reading.joint_poses import RobotReading, joint_readings
+from hecbench_datasets.reading.pictured_proof import settled
 from hecbench_datasets.reading.seen_targets import seen_target
 from hecbench_datasets.reading.sources import natural
 from hecbench_datasets.reading.survey import Survey
@@ -76,16 +76,15 @@ def load_beside_pictures(
     return settled(found.path, recording, ways, hints, told and (target is None or len(ways) == 1))
 
 
-def _ways(beside: Beside, hints: Hints, robots: Sequence[str | Path]) -> list[Way]:
+def _ways(beside: Beside, hints: Hints, robots: Sequence[str | Path]) -> list[RobotReading]:
     """Every reading of the robot's rows."""
     if beside.poses is None:
         assert beside.stream.joints is not None
         joints = beside.stream.joints[beside.rows]
-        found: list[JointReading] = joint_readings(joints, beside.stream.joint_names, robots)
-        return [Way(one.reading, one.robot, one.joints_rad) for one in found]
+        return joint_readings(joints, beside.stream.joint_names, robots)
     return [
-        Way(reading)
-        for reading in readings(
+        RobotReading(reading)
+        for reading in pose_conventions(
             beside.poses.numbers[beside.rows],
             ("base", "flange"),
             rotation=hints.robot_rotation,

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from hecbench.errors import InputError
-from hecbench.exchange.pose_numbers import Reading
+from hecbench.exchange.pose_numbers import PoseConvention
 from hecbench.recording import RobotDescription
 from hecbench.robots.model import KNOWN_ARMS, load_robot
 from hecbench.se3 import Array
@@ -23,17 +24,27 @@ BASES = ("base", "base_link", "panda_link0", "fr3_link0", "link_base")
 
 
 @dataclass(frozen=True, eq=False)
-class JointReading:
-    """Joints as those of one arm, in rad, and the flange poses that they give."""
+class RobotReading:
+    """One reading of the robot's numbers; the robot and (N, J) rad where they were joints."""
 
-    reading: Reading
-    robot: RobotDescription
-    joints_rad: Array
+    flange: PoseConvention
+    robot: RobotDescription | None = None
+    joints_rad: Array | None = None
+
+    def at(self, rows: Any) -> RobotReading:
+        """The same of some rows."""
+        flange = replace(self.flange, poses=self.flange.poses[rows])
+        return RobotReading(flange, self.robot, None if self.joints_rad is None else self.joints_rad[rows])
+
+    @property
+    def base_T_flange(self) -> Array | None:
+        """(N, 4, 4), where they do not follow from the joints of a robot with a model."""
+        return None if self.robot and self.robot.source else self.flange.poses
 
 
 def joint_readings(
     joints: Array, names: Sequence[str], robots: Sequence[str | Path], units: Sequence[str] = ("rad", "deg")
-) -> list[JointReading]:
+) -> list[RobotReading]:
     """Every arm and unit that the joints fit.
 
     Args:
@@ -45,7 +56,7 @@ def joint_readings(
     Raises:
         InputError: no arm has so many joints, or they lie outside all limits.
     """
-    found: list[JointReading] = []
+    found: list[RobotReading] = []
     faults = []
     for robot in robots or (*KNOWN_ARMS, "panda"):
         for unit in units:
@@ -60,7 +71,7 @@ def joint_readings(
     return found
 
 
-def _of_robot(robot: str | Path, joints: Array, names: Sequence[str], unit: str) -> Iterator[JointReading]:
+def _of_robot(robot: str | Path, joints: Array, names: Sequence[str], unit: str) -> Iterator[RobotReading]:
     if robot == "panda":
         if joints.shape[1] != 7:
             raise InputError(f"{joints.shape[1]} joints are not a Panda's seven")
@@ -71,7 +82,7 @@ def _of_robot(robot: str | Path, joints: Array, names: Sequence[str], unit: str)
     else:
         described, joints, poses = _described(robot, joints, names)
     text = f"{Path(robot).stem} joints in {unit}"
-    yield JointReading(Reading(poses, f"base_T_flange {text}"), described, joints)
+    yield RobotReading(PoseConvention(poses, f"base_T_flange {text}"), described, joints)
 
 
 def _described(

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from hecbench.errors import InputError
 from hecbench.exchange.conventions import prove
-from hecbench.exchange.pose_numbers import Reading, readings
+from hecbench.exchange.pose_numbers import PoseConvention, pose_conventions
 from hecbench.recording import Mounting, Recording
 from hecbench_datasets.reading.hints import Hints
 
@@ -39,7 +39,7 @@ def paired(
     ids: Sequence[str] | None = None,
     **fields: Any,
 ) -> Recording:
-    """The recording of robot and target poses (N, 6 | 7 | 12 | 16) under the reading that is proven or told.
+    """The recording of robot and target poses (N, 6 | 7 | 12 | 16) under the convention that is proven or given.
 
     Args:
         path: names the source and the recording.
@@ -51,7 +51,7 @@ def paired(
         **fields: further fields of the recording.
 
     Raises:
-        InputError: the numbers are no poses, or no reading can be told from the others.
+        InputError: the numbers are no poses, or no reading can be distinguished from the others.
     """
     robot_readings = _stream(
         f"{path}: robot pose",
@@ -60,7 +60,7 @@ def paired(
         rotation=hints.robot_rotation,
         assumed_rotation=documented.robot_rotation,
         unit=hints.robot_unit or documented.robot_unit,
-        inverted=_told(hints.robot_pose, "flange_T_base"),
+        inverted=_is_inverse(hints.robot_pose, "flange_T_base"),
         assumed_inverted=documented.robot_inverted,
     )
     target_readings = _stream(
@@ -70,13 +70,13 @@ def paired(
         rotation=hints.target_rotation,
         assumed_rotation=documented.target_rotation,
         unit=hints.target_unit or documented.target_unit,
-        inverted=_told(hints.target_pose, "target_T_camera"),
+        inverted=_is_inverse(hints.target_pose, "target_T_camera"),
         assumed_inverted=documented.target_inverted,
     )
     mounting = hints.mounting or documented.mounting
-    told = hints.mounting is not None
+    mounting_given = hints.mounting is not None
     proof = prove(
-        str(path), robot_readings, target_readings, [mounting] if mounting else list(Mounting), told
+        str(path), robot_readings, target_readings, [mounting] if mounting else list(Mounting), mounting_given
     )
     count = len(proof.base_T_flange)
     return Recording(
@@ -91,12 +91,12 @@ def paired(
     )
 
 
-def _stream(source: str, numbers: ArrayLike, frames: tuple[str, str], **options: Any) -> list[Reading]:
+def _stream(source: str, numbers: ArrayLike, frames: tuple[str, str], **options: Any) -> list[PoseConvention]:
     try:
-        return readings(numbers, frames, **options)
+        return pose_conventions(numbers, frames, **options)
     except InputError as error:
         raise InputError(f"{source}: {error}") from error
 
 
-def _told(spelling: str | None, inverse: str) -> bool | None:
+def _is_inverse(spelling: str | None, inverse: str) -> bool | None:
     return None if spelling is None else spelling == inverse

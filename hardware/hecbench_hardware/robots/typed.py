@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from hecbench.errors import InputError
-from hecbench.exchange.pose_numbers import ROTATIONS, VENDORS, readings
+from hecbench.exchange.pose_numbers import ROTATIONS, VENDORS, pose_conventions
 from hecbench.registry import hookimpl
 from hecbench.se3 import Array
 from hecbench.specs import DeviceSpec, Kind
@@ -71,7 +71,7 @@ class TypedRobot:
         else:
             if degrees and len(numbers) == 6:
                 numbers = np.concatenate([numbers[:3], turn[3:]])
-            found = readings(
+            found = pose_conventions(
                 numbers[None], ("base", "flange"), rotation=convention, unit=unit, inverted=False
             )
             self._base_T_flange = found[0].poses[0]

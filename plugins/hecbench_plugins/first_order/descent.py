@@ -153,7 +153,7 @@ def _one_thread() -> Iterator[None]:
         torch.set_num_threads(before)
 
 
-def answer(
+def to_estimate(
     run: DescentHistory,
     views: Sequence[View],
     drawers: Sequence[Drawer],

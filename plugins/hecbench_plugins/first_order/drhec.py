@@ -30,7 +30,7 @@ from hecbench.recording import Recording
 from hecbench.se3 import Array
 from hecbench.specs import Kind, Translator, TranslatorSpec
 from hecbench_plugins.first_order.backend import Backend, drawer
-from hecbench_plugins.first_order.descent import AdamSettings, DescentHistory, Verdict, answer, descend
+from hecbench_plugins.first_order.descent import AdamSettings, DescentHistory, Verdict, descend, to_estimate
 from hecbench_plugins.first_order.drawing import Drawer
 from hecbench_plugins.first_order.losses import SquaredError, geometry, geometry_of
 from hecbench_plugins.first_order.masks import mask_of
@@ -112,7 +112,7 @@ class DRHeC:
         settings = AdamSettings(self.iterations, self.rate, freeze_by_zero=literal)
         run = descend(drawers, numbers, objective, settings)
         pose = run.last if literal or run.best is None else run.best
-        return answer(run, views, drawers, pose, self._details(run, views, pose, objective))
+        return to_estimate(run, views, drawers, pose, self._details(run, views, pose, objective))
 
     def _details(
         self, run: DescentHistory, views: Sequence[View], pose: Array, objective: _Objective

@@ -20,7 +20,7 @@ from hecbench.estimate import Estimate
 from hecbench.recording import Recording
 from hecbench.se3 import Array
 from hecbench_plugins.first_order.backend import Backend
-from hecbench_plugins.first_order.descent import AdamSettings, Verdict, answer, descend
+from hecbench_plugins.first_order.descent import AdamSettings, Verdict, descend, to_estimate
 from hecbench_plugins.first_order.hemisphere import Hemisphere, best_on_hemisphere
 from hecbench_plugins.first_order.losses import SquaredError
 from hecbench_plugins.first_order.masks import MaskMode, mask_drawers, mask_of
@@ -78,4 +78,4 @@ class EasyHeC:
 
         settings = AdamSettings(self.iterations, self.rate, self.weight_decay)
         run = descend(drawers, LogVector(start), objective, settings)
-        return answer(run, views, drawers, run.last, details)
+        return to_estimate(run, views, drawers, run.last, details)

@@ -25,7 +25,7 @@ from hecbench.estimate import Estimate
 from hecbench.recording import Recording
 from hecbench.se3 import Array
 from hecbench_plugins.first_order.backend import Backend
-from hecbench_plugins.first_order.descent import AdamSettings, Verdict, answer, descend
+from hecbench_plugins.first_order.descent import AdamSettings, Verdict, descend, to_estimate
 from hecbench_plugins.first_order.drawing import Drawer
 from hecbench_plugins.first_order.losses import SquaredError
 from hecbench_plugins.first_order.masks import mask_drawers, mask_of
@@ -62,7 +62,7 @@ class IPE:
         losses = _Losses([mask_of(view) for view in views], drawers, numbers, self)
         run = descend(drawers, numbers, losses, AdamSettings(self.iterations, self.rate))
         weights = None if losses.weights is None else losses.weights.tolist()
-        return answer(run, views, drawers, run.last, {"weights": weights})
+        return to_estimate(run, views, drawers, run.last, {"weights": weights})
 
 
 class _Losses:

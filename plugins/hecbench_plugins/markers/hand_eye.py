@@ -154,7 +154,7 @@ def rotation_spread_deg(rotations: Array) -> float:
     return float(np.rad2deg(np.sqrt((angles**2).mean())))
 
 
-def answer(
+def to_estimate(
     pairs: PosedSamples,
     parent_T_camera: Array,
     carrier_T_target: Array | None = None,

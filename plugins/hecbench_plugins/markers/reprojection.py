@@ -132,7 +132,7 @@ def rms_px(problem: Problem, solution: Solution) -> float:
     return float(np.sqrt((solution.at.residuals**2).sum() / problem.seen.sum()))
 
 
-def answer(problem: Problem, solution: Solution, **extras: object) -> Estimate:
+def to_estimate(problem: Problem, solution: Solution, **extras: object) -> Estimate:
     """The estimate with its evidence."""
     corrections = solution.at.corrections
     diagnostics: dict[str, object] = {

@@ -180,7 +180,7 @@ def _descend(e: Eliminated, rotation: Array, settings: DescentSettings = DESCENT
     return rotation, settings.iterations
 
 
-def answer(
+def to_estimate(
     positions: MarkerPositions, rotation: Array, termination: Termination, iterations: int = 0
 ) -> Estimate:
     """The estimate with its evidence: the rms distance left, and how far from coplanar the positions are.

@@ -42,7 +42,7 @@ def covariance(camera_T_parent: Array, last: ContourEquations, prior: Array) -> 
     return se3.inverse_covariance(camera_T_parent, seen_from_camera)
 
 
-def answer(
+def to_estimate(
     end: Refined,
     covariance: Array,
     sample_ids: Sequence[str],

@@ -20,7 +20,7 @@ from hecbench_plugins.maskless.align import (
     limited,
     settled,
 )
-from hecbench_plugins.second_order.unknowns import told
+from hecbench_plugins.second_order.unknowns import details
 
 PRIOR_RAD = float(np.deg2rad(0.1))
 """Standard deviation of an arm's constant joint offsets about the nominal model."""
@@ -70,7 +70,7 @@ def with_joint_offsets(
         if converged:
             break
     sigmas = np.sqrt(CORRELATED_POINTS * np.diag(np.linalg.inv(found.A + np.diag(prior)))[6:])
-    extras = told(robot.joint_names, offsets, sigmas, np.full(len(offsets), PRIOR_RAD))
+    extras = details(robot.joint_names, offsets, sigmas, np.full(len(offsets), PRIOR_RAD))
     return Offsets(Refined(pose, found, iteration, converged), extras)
 
 

@@ -229,7 +229,7 @@ class Maskless:
             end, extras, judged = solved.refined, solved.extras, solved.refined.last
         else:
             judged = compare(lines, end.camera_T_parent, robot, nominal, last, left_out_m)
-        return evidence.answer(
+        return evidence.to_estimate(
             end,
             evidence.covariance(end.camera_T_parent, judged, prior_information(len(nominal))),
             canvas.sample_ids,

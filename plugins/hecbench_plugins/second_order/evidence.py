@@ -64,7 +64,7 @@ def contour_found(views: Sequence[View], pose: Array, trace: Trace) -> float:
     return min(shares)
 
 
-def answer(
+def to_estimate(
     views: Sequence[View], end: FinalStage, iou: float, trace: Trace, termination: Termination
 ) -> Estimate:
     """The estimate with its evidence: covariance, observability, and the test of the other side.

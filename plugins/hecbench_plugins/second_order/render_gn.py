@@ -86,7 +86,7 @@ class RenderGN:
         self._believe(views, end, overlap, trace)
         if self.unknown:
             end = self._extend(end, robot, trace)
-        found = evidence.answer(views, end, overlap, trace, _TERMINATIONS[end.descent.ended])
+        found = evidence.to_estimate(views, end, overlap, trace, _TERMINATIONS[end.descent.ended])
         return (
             replace(found, camera=_calibrated(recording.present.camera, found))
             if "focal" in found.extras

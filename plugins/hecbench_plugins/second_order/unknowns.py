@@ -151,11 +151,11 @@ def solve(photometry: ExtendedPhotometry, start: Array, noise: float, rounds: in
     return Solved(
         Descent(pose, cost, A, ended),
         covariance[:6, :6],
-        told(names, values, sigmas, photometry.sigmas),
+        details(names, values, sigmas, photometry.sigmas),
     )
 
 
-def told(names: Sequence[str], values: Array, sigmas: Array, prior_sigmas: Array) -> dict[str, Any]:
+def details(names: Sequence[str], values: Array, sigmas: Array, prior_sigmas: Array) -> dict[str, Any]:
     """What was found for each unknown, and whether the pictures said anything about it beside the prior."""
     return {
         name: {"value": float(value), "sigma": float(sigma), "observable": bool(sigma < _UNSEEN * prior)}

@@ -12,7 +12,7 @@ from hecbench.estimate import Estimate
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Need, SolverSpec
-from hecbench_plugins.markers.hand_eye import answer, pose_pairs
+from hecbench_plugins.markers.hand_eye import pose_pairs, to_estimate
 from hecbench_plugins.markers.opencv_hand_eye import hand_eye
 
 
@@ -23,7 +23,7 @@ def andreff(recording: Recording, *, rng: np.random.Generator) -> Estimate:
     import cv2
 
     pairs = pose_pairs(recording)
-    return answer(pairs, hand_eye(pairs, cv2.CALIB_HAND_EYE_ANDREFF))
+    return to_estimate(pairs, hand_eye(pairs, cv2.CALIB_HAND_EYE_ANDREFF))
 
 
 @hookimpl

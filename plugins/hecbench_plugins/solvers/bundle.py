@@ -19,8 +19,8 @@ from hecbench.specs import Need, SolverSpec
 from hecbench_plugins.markers.reprojection import (
     DEFAULT_NOISE,
     adjust_with_exact_robot,
-    answer,
     corner_problem,
+    to_estimate,
 )
 
 
@@ -82,11 +82,11 @@ class Bundle:
         first = start(problem, exact.state.parent_T_camera, exact.state.carrier_T_target)
         solution = adjust_with_noise(problem, first, self._noise(), self._known())
         if not self.intrinsics:
-            return answer(problem, solution)
+            return to_estimate(problem, solution)
         fx, fy, cx, cy = solution.state.parameters[:4]
         K, distortion = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1]]), solution.state.parameters[4:]
         sigmas = np.sqrt(np.diagonal(solution.covariance)[-len(problem.parameters) :])
-        found = answer(
+        found = to_estimate(
             problem,
             solution,
             K=K.tolist(),

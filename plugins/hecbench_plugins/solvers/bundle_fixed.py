@@ -12,13 +12,13 @@ from hecbench.estimate import Estimate
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Need, SolverSpec
-from hecbench_plugins.markers.reprojection import adjust_with_exact_robot, answer, corner_problem
+from hecbench_plugins.markers.reprojection import adjust_with_exact_robot, corner_problem, to_estimate
 
 
 def bundle_fixed(recording: Recording, *, rng: np.random.Generator) -> Estimate:
     """Levenberg-Marquardt from Single3D and Shah, with Huber's loss."""
     problem = corner_problem(recording)
-    return answer(problem, adjust_with_exact_robot(recording, problem))
+    return to_estimate(problem, adjust_with_exact_robot(recording, problem))
 
 
 @hookimpl

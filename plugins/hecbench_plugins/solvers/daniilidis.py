@@ -10,7 +10,7 @@ from hecbench.estimate import Estimate
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Need, SolverSpec
-from hecbench_plugins.markers.hand_eye import answer, pose_pairs
+from hecbench_plugins.markers.hand_eye import pose_pairs, to_estimate
 from hecbench_plugins.markers.opencv_hand_eye import hand_eye, without_half_turns
 
 
@@ -21,7 +21,7 @@ def daniilidis(recording: Recording, *, rng: np.random.Generator) -> Estimate:
     pairs = pose_pairs(recording)
     chosen = without_half_turns(pairs)
     parent_T_camera = hand_eye(chosen, cv2.CALIB_HAND_EYE_DANIILIDIS)
-    return answer(pairs, parent_T_camera, diagnostics={"samples_used": len(chosen)})
+    return to_estimate(pairs, parent_T_camera, diagnostics={"samples_used": len(chosen)})
 
 
 @hookimpl

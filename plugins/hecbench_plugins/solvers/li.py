@@ -10,7 +10,7 @@ from hecbench.estimate import Estimate
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Need, SolverSpec
-from hecbench_plugins.markers.hand_eye import answer, pose_pairs
+from hecbench_plugins.markers.hand_eye import pose_pairs, to_estimate
 from hecbench_plugins.markers.opencv_hand_eye import robot_world
 
 
@@ -19,7 +19,7 @@ def li(recording: Recording, *, rng: np.random.Generator) -> Estimate:
     import cv2
 
     pairs = pose_pairs(recording)
-    return answer(pairs, *robot_world(pairs, cv2.CALIB_ROBOT_WORLD_HAND_EYE_LI))
+    return to_estimate(pairs, *robot_world(pairs, cv2.CALIB_ROBOT_WORLD_HAND_EYE_LI))
 
 
 @hookimpl

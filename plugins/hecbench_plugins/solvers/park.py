@@ -12,9 +12,9 @@ from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Need, SolverSpec
 from hecbench_plugins.markers.hand_eye import (
-    answer,
     pose_pairs,
     rotation_from_logs,
+    to_estimate,
     translation_given_rotation,
 )
 from hecbench_plugins.markers.opencv_hand_eye import hand_eye
@@ -30,7 +30,7 @@ def park(recording: Recording, *, rng: np.random.Generator) -> Estimate:
     if reflected:
         rotation = rotation_from_logs(pairs)
         parent_T_camera = se3.make(rotation, translation_given_rotation(pairs, rotation))
-    return answer(pairs, parent_T_camera, diagnostics={"reflection_corrected": reflected})
+    return to_estimate(pairs, parent_T_camera, diagnostics={"reflection_corrected": reflected})
 
 
 @hookimpl

@@ -41,7 +41,7 @@ class Single3DClosed:
                 f"{len(positions.hand)} samples; the nine linear unknowns need {MINIMUM_SAMPLES} or more"
             )
         rotation = single3d.closed_form(positions, reference_projection=self.reference_projection)
-        return single3d.answer(positions, rotation, Termination.CLOSED_FORM)
+        return single3d.to_estimate(positions, rotation, Termination.CLOSED_FORM)
 
 
 @hookimpl

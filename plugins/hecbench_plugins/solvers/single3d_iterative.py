@@ -19,7 +19,7 @@ def single3d_iterative(recording: Recording, *, rng: np.random.Generator) -> Est
     """Gauss-Newton over the rotation alone (variable projection), started from the closed form."""
     positions = single3d.marker_positions(recording)
     rotation, iterations = single3d.iterate(positions)
-    return single3d.answer(positions, rotation, Termination.CONVERGED, iterations)
+    return single3d.to_estimate(positions, rotation, Termination.CONVERGED, iterations)
 
 
 @hookimpl

@@ -16,10 +16,10 @@ from hecbench.specs import Need, SolverSpec
 from hecbench_plugins.markers.hand_eye import (
     MINIMUM_ROTATION_DEG,
     PosedSamples,
-    answer,
     pose_pairs,
     rotation_diversity_deg,
     rotation_from_logs,
+    to_estimate,
 )
 from hecbench_plugins.markers.opencv_hand_eye import hand_eye
 
@@ -40,7 +40,9 @@ def tsai(recording: Recording, *, rng: np.random.Generator) -> Estimate:
     turn = _nearest_cube_rotation(rotation_from_logs(pairs))
     turned = PosedSamples(pairs.hand, turn @ pairs.camera_T_target)
     parent_T_camera = hand_eye(turned, cv2.CALIB_HAND_EYE_TSAI) @ turn
-    return answer(pairs, parent_T_camera, diagnostics={"pairs_used": usable, "pairs": len(pairs.motions[0])})
+    return to_estimate(
+        pairs, parent_T_camera, diagnostics={"pairs_used": usable, "pairs": len(pairs.motions[0])}
+    )
 
 
 def _require_usable_pairs(pairs: PosedSamples) -> int:

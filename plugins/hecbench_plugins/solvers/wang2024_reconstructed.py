@@ -23,9 +23,9 @@ from hecbench_plugins.markers import dual_quaternions
 from hecbench_plugins.markers.hand_eye import (
     MINIMUM_ROTATION_DEG,
     PosedSamples,
-    answer,
     pose_pairs,
     rotation_diversity_deg,
+    to_estimate,
 )
 
 _ITERATIONS = 50
@@ -72,7 +72,7 @@ class Wang2024:
             "pairs": len(pairs.motions[0]),
             "null_space_gap": float(singular_values[5] / max(singular_values[6], 1e-300)),
         }
-        return answer(pairs, dual_quaternions.to_transform(real, dual), diagnostics=diagnostics)
+        return to_estimate(pairs, dual_quaternions.to_transform(real, dual), diagnostics=diagnostics)
 
 
 def _without_half_turns(pairs: PosedSamples) -> tuple[Array, Array]:

@@ -218,8 +218,8 @@ class GuessFree:
         for other in ends:
             if self._contradicts(other, best):
                 raise Refusal(
-                    f"two cameras explain the masks equally well: {_told(best)} and {_told(other)}; add views with"
-                    " other joints, or give a start"
+                    f"two cameras explain the masks equally well: {_describe(best)} and {_describe(other)};"
+                    " add views with other joints, or give a start"
                 )
         searched = {"search_overlap": found[0].overlap, "search_starts": len(ends)}
         return replace(
@@ -272,6 +272,6 @@ class GuessFree:
         )
 
 
-def _told(end: Estimate) -> str:
+def _describe(end: Estimate) -> str:
     place = ", ".join(f"{x:.2f}" for x in end.pose[:3, 3])
     return f"at ({place}) m with overlap {end.diagnostics['overlap']:.3f}"
