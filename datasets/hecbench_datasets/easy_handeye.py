@@ -22,16 +22,20 @@ from hecbench.se3 import Array
 from hecbench.specs import DatasetSpec
 from hecbench_datasets.reading.hints import hints_for
 from hecbench_datasets.reading.pairing import Documented, paired
-from hecbench_datasets.reading.sources import YAML_SUFFIXES, files_in, finite, foreign, head, item, yaml_value
+from hecbench_datasets.reading.sources import (
+    YAML_SUFFIXES,
+    FileOfFormat,
+    files_in,
+    finite,
+    foreign,
+    head,
+    item,
+    yaml_value,
+)
 
 _SUFFIXES = (*YAML_SUFFIXES, ".samples", ".calib")
 _TRACKING = ("tracking", "optical", "opt")
 _LISTS = ("hand_world_samples", "camera_marker_samples")
-
-
-def _file(path: Path) -> Path | None:
-    files = [path] if path.suffix.lower() in _SUFFIXES else files_in(path, *_SUFFIXES)
-    return next((file for file in files if _is_samples(head(file))), None)
 
 
 def _is_samples(content: str) -> bool:
@@ -39,17 +43,13 @@ def _is_samples(content: str) -> bool:
     return listed or any(f"{key}:" in content for key in _LISTS)
 
 
-def sniff(path: Path) -> bool:
-    """A file, or a folder with one, that lists robot and tracking transforms."""
-    return _file(path) is not None
+_FILE = FileOfFormat(shows=_is_samples, described="easy_handeye samples; check the file", suffixes=_SUFFIXES)
 
 
 @foreign
 def load(path: Path) -> Recording:
     """Read the samples, and the calibration file beside them."""
-    file = _file(path)
-    if file is None:
-        raise InputError(f"{path}: holds no easy_handeye samples; check the file")
+    file = _FILE.of(path)
     content = yaml_value(file)
     robot, target = _listed(content, file) if _LISTS[0] in content else _paired_samples(content, file)
     parameters, start = _calibration(file)
@@ -143,6 +143,6 @@ def hecbench_datasets() -> Iterable[DatasetSpec]:
     yield DatasetSpec(
         name="easy_handeye",
         summary="easy_handeye samples of ROS 1 and 2 (YAML), with the calibration file beside them",
-        sniff=sniff,
+        sniff=_FILE.sniff,
         load=load,
     )

@@ -21,28 +21,22 @@ from hecbench.specs import DatasetSpec
 from hecbench.system import pictures
 from hecbench.targets import Target
 from hecbench_datasets.reading.hints import circle_grid, hinted_target, hints_for
-from hecbench_datasets.reading.sources import finite, foreign, head, item, yaml_value
+from hecbench_datasets.reading.sources import FileOfFormat, finite, foreign, item, yaml_value
 
-_NAMES = ("cal_data.yaml", "data.yaml")
 _QUATERNION = ("x", "y", "z", "qx", "qy", "qz", "qw")
 
-
-def _file(path: Path) -> Path | None:
-    candidates = [path] if path.is_file() else [path / name for name in _NAMES]
-    return next((file for file in candidates if "target_finder" in head(file, 20000)), None)
-
-
-def sniff(path: Path) -> bool:
-    """A folder whose `cal_data.yaml` describes a target finder."""
-    return _file(path) is not None
+_FILE = FileOfFormat(
+    shows=lambda text: "target_finder" in text,
+    described="cal_data.yaml with a target_finder; check the folder",
+    names=("cal_data.yaml", "data.yaml"),
+    first=20000,
+)
 
 
 @foreign
 def load(path: Path) -> Recording:
     """Read poses, camera and target; the images are for the detector."""
-    file = _file(path)
-    if file is None:
-        raise InputError(f"{path}: holds no cal_data.yaml with a target_finder; check the folder")
+    file = _FILE.of(path)
     content = yaml_value(file)
     entries = item(content, "data", file)
     if not isinstance(entries, list) or not entries:
@@ -99,6 +93,6 @@ def hecbench_datasets() -> Iterable[DatasetSpec]:
     yield DatasetSpec(
         name="industrial",
         summary="ROS-Industrial calibration folder: cal_data.yaml, poses, images of a circle grid",
-        sniff=sniff,
+        sniff=_FILE.sniff,
         load=load,
     )

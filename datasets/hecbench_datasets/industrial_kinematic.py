@@ -16,25 +16,19 @@ from hecbench.errors import InputError
 from hecbench.recording import Mounting, Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import DatasetSpec
-from hecbench_datasets.reading.sources import finite, foreign, head, item, yaml_value
+from hecbench_datasets.reading.sources import FileOfFormat, finite, foreign, item, yaml_value
 
-
-def _file(path: Path) -> Path | None:
-    file = path if path.is_file() else path / "measurements.yaml"
-    return file if "target_joints" in head(file) else None
-
-
-def sniff(path: Path) -> bool:
-    """A folder (or file) `measurements.yaml` with `target_joints`."""
-    return _file(path) is not None
+_FILE = FileOfFormat(
+    shows=lambda text: "target_joints" in text,
+    described="measurements.yaml with target_joints; check the folder",
+    names=("measurements.yaml",),
+)
 
 
 @foreign
 def load(path: Path) -> Recording:
     """Read joints and target poses."""
-    file = _file(path)
-    if file is None:
-        raise InputError(f"{path}: holds no measurements.yaml with target_joints")
+    file = _FILE.of(path)
     content = yaml_value(file)
     poses = [item(sample, "pose", file) for sample in content.values()]
     numbers = finite(
@@ -72,6 +66,6 @@ def hecbench_datasets() -> Iterable[DatasetSpec]:
     yield DatasetSpec(
         name="industrial_kinematic",
         summary="ROS-Industrial kinematic calibration: measurements.yaml with joints and target poses",
-        sniff=sniff,
+        sniff=_FILE.sniff,
         load=load,
     )

@@ -16,28 +16,31 @@ from hecbench.registry import hookimpl
 from hecbench.specs import DatasetSpec
 from hecbench_datasets.reading.hints import hints_for
 from hecbench_datasets.reading.pairing import Documented, paired
-from hecbench_datasets.reading.sources import YAML_SUFFIXES, files_in, finite, foreign, head, item, yaml_value
+from hecbench_datasets.reading.sources import (
+    YAML_SUFFIXES,
+    FileOfFormat,
+    files_in,
+    finite,
+    foreign,
+    head,
+    item,
+    yaml_value,
+)
 
 _SUFFIXES = (*YAML_SUFFIXES, ".json")
 _ROBOT, _TARGET = "effector_wrt_world", "object_wrt_sensor"
 
-
-def _file(path: Path) -> Path | None:
-    files = [path] if path.suffix.lower() in _SUFFIXES else files_in(path, *_SUFFIXES)
-    return next((file for file in files if _ROBOT in head(file)), None)
-
-
-def sniff(path: Path) -> bool:
-    """A file, or a folder with one, with `effector_wrt_world`."""
-    return _file(path) is not None
+_FILE = FileOfFormat(
+    shows=lambda text: _ROBOT in text,
+    described="moveit_calibration samples; check the file",
+    suffixes=_SUFFIXES,
+)
 
 
 @foreign
 def load(path: Path) -> Recording:
     """Read the samples, and the joint states beside them."""
-    file = _file(path)
-    if file is None:
-        raise InputError(f"{path}: holds no moveit_calibration samples; check the file")
+    file = _FILE.of(path)
     samples = yaml_value(file)
     if not isinstance(samples, list) or not samples:
         raise InputError(f"{file}: expected a list of samples with {_ROBOT} and {_TARGET}")
@@ -74,6 +77,6 @@ def hecbench_datasets() -> Iterable[DatasetSpec]:
     yield DatasetSpec(
         name="moveit",
         summary="moveit_calibration samples (YAML or JSON), joint states beside them",
-        sniff=sniff,
+        sniff=_FILE.sniff,
         load=load,
     )

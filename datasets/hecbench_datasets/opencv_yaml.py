@@ -17,30 +17,24 @@ from hecbench.se3 import Array
 from hecbench.specs import DatasetSpec
 from hecbench_datasets.reading.hints import hints_for
 from hecbench_datasets.reading.pairing import Documented, paired
-from hecbench_datasets.reading.sources import YAML_SUFFIXES, files_in, finite, foreign, head, yaml_value
+from hecbench_datasets.reading.sources import YAML_SUFFIXES, FileOfFormat, finite, foreign, yaml_value
 
 _ROBOT = re.compile(r"T1|robot|gripper|flange|hand|tool|ee\b|base", re.IGNORECASE)
 _TARGET = re.compile(r"T2|target|cam|marker|board|tag|eye", re.IGNORECASE)
 _NUMBERED = re.compile(r"^(\w*?)_?(\d+)$")
 _FIRST = re.compile(r"^\s*\w*(?<!\d)[01]\s*:\s*!!opencv-matrix", re.MULTILINE)
 
-
-def sniff(path: Path) -> bool:
-    """A file, or a folder with one, whose matrices are numbered from 0 or 1."""
-    return _file(path) is not None
-
-
-def _file(path: Path) -> Path | None:
-    files = [path] if path.suffix.lower() in YAML_SUFFIXES else files_in(path, *YAML_SUFFIXES)
-    return next((file for file in files if _FIRST.search(head(file))), None)
+_FILE = FileOfFormat(
+    shows=lambda text: _FIRST.search(text) is not None,
+    described="OpenCV matrices numbered from 0 or 1, such as T1_0 and T2_0",
+    suffixes=YAML_SUFFIXES,
+)
 
 
 @foreign
 def load(path: Path) -> Recording:
     """Read the pairs."""
-    file = _file(path)
-    if file is None:
-        raise InputError(f"{path}: holds no OpenCV matrices numbered from 0 or 1, such as T1_0 and T2_0")
+    file = _FILE.of(path)
     families = _families(file)
     robot = [name for name in families if _ROBOT.search(name) and not _TARGET.search(name)]
     target = [name for name in families if _TARGET.search(name)]
@@ -79,6 +73,6 @@ def hecbench_datasets() -> Iterable[DatasetSpec]:
     yield DatasetSpec(
         name="opencv_yaml",
         summary="OpenCV YAML with numbered 4x4 matrices (handeye_calib_camodocal)",
-        sniff=sniff,
+        sniff=_FILE.sniff,
         load=load,
     )

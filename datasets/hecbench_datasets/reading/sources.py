@@ -7,6 +7,7 @@ import io
 import re
 import zipfile
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import wraps
 from pathlib import Path
 from typing import Any
@@ -69,6 +70,48 @@ def files_in(folder: Path, *suffixes: str) -> list[Path]:
     except OSError:
         return []
     return sorted(found, key=natural)
+
+
+@dataclass(frozen=True, kw_only=True)
+class FileOfFormat:
+    """How the file of a format is found: it is given, or lies in a folder, and its first characters show the format.
+
+    Attributes:
+        shows: whether the first characters are those of the format.
+        described: what is missing where there is no such file, with the cure.
+        names: of the file in a folder.
+        suffixes: of the file, instead of names.
+        first: how many characters `shows` needs.
+    """
+
+    shows: Callable[[str], bool]
+    described: str
+    names: tuple[str, ...] = ()
+    suffixes: tuple[str, ...] = ()
+    first: int = 4096
+
+    def find(self, path: Path) -> Path | None:
+        """The first such file, if there is one."""
+        if self.names:
+            candidates = [path, *(path / name for name in self.names)]
+        else:
+            candidates = [path] if path.suffix.lower() in self.suffixes else files_in(path, *self.suffixes)
+        return next((file for file in candidates if self.shows(head(file, self.first))), None)
+
+    def sniff(self, path: Path) -> bool:
+        """Whether there is one."""
+        return self.find(path) is not None
+
+    def of(self, path: Path) -> Path:
+        """The file.
+
+        Raises:
+            InputError: there is none.
+        """
+        file = self.find(path)
+        if file is None:
+            raise InputError(f"{path}: holds no {self.described}")
+        return file
 
 
 def natural(path: Path | str) -> list[tuple[int, str]]:
