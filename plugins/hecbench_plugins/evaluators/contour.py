@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 
 from hecbench import se3, statistics
-from hecbench.estimate import Estimate, Status
+from hecbench.estimate import Estimate
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
-from hecbench.samples.standstills import folds, pose_labels
+from hecbench.samples.standstills import pose_labels
 from hecbench.se3 import Array
 from hecbench.specs import EvaluatorSpec, Need, ResultSection
+from hecbench_plugins.left_out import solve_folds
 
-FOLDS = 5
 _NEEDS = frozenset({Need.IMAGES, Need.ROBOT_MODEL, Need.JOINTS, Need.INTRINSICS})
 _FEWEST_SAMPLES = 6
 """A search without a start needs five photographs."""
@@ -35,23 +35,18 @@ def of_left_out_photographs(
     answer is counted in `failed_folds` and predicts nothing.
     """
     photographed = [i for i, image in enumerate(recording.images or ()) if image is not None]
-    parts = folds(recording, photographed, FOLDS, rng)
-    rows: list[Array] = []
-    used: list[int] = []
-    failed = 0
-    for fold in parts:
-        fitted = solve(recording.subset([i for i in photographed if i not in fold]))
-        if fitted.status is not Status.OK:
-            failed += 1
-            continue
-        used += (left_out := np.sort(fold)).tolist()
-        rows.append(agreement(recording.subset(left_out), fitted))
-    counts: dict[str, Any] = {"folds": len(parts), "failed_folds": failed}
-    if not rows:
+    solved, folds = solve_folds(recording, photographed, solve, rng)
+    counts: dict[str, Any] = dict(folds)
+    if not solved:
         return counts | {"samples": 0}
+    used = [np.sort(fold.left_out) for fold in solved]
+    rows = [
+        agreement(recording.subset(left_out), fold.estimate)
+        for left_out, fold in zip(used, solved, strict=True)
+    ]
     distance_px, share = np.concatenate(rows).T
     known = np.isfinite(distance_px)
-    distance_px, labels = distance_px[known], pose_labels(recording, used)[known]
+    distance_px, labels = distance_px[known], pose_labels(recording, np.concatenate(used))[known]
     counts |= {"samples": len(share), "confirmed": float(share.mean())}
     if not len(distance_px):
         return counts

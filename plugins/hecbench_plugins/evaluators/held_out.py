@@ -9,16 +9,15 @@ from typing import Any
 import numpy as np
 
 from hecbench import se3, statistics
-from hecbench.estimate import Estimate, Status
+from hecbench.estimate import Estimate
 from hecbench.lens import same
 from hecbench.recording import CameraModel, Recording
 from hecbench.registry import hookimpl
-from hecbench.samples.standstills import folds, pose_labels
+from hecbench.samples.standstills import pose_labels
 from hecbench.se3 import Array
 from hecbench.specs import EvaluatorSpec, Need, ResultSection
+from hecbench_plugins.left_out import solve_folds
 from hecbench_plugins.markers.target_poses import project, target_poses
-
-FOLDS = 5
 
 
 def held_out(
@@ -40,22 +39,15 @@ def held_out(
         np.isfinite(hand).all((1, 2)) & np.isfinite(recording.present.camera_T_target).all((1, 2))
     )
     residuals: dict[str, Array] = {}
-    answers: list[Array] = []
-    failed = 0
-    parts = folds(recording, usable, FOLDS, rng)
-    for fold in parts:
-        training = np.setdiff1d(usable, fold)
-        fitted = solve(recording.subset(training)) if len(training) else None
-        if fitted is None or fitted.status is not Status.OK:
-            failed += 1
-            continue
-        answers.append(fitted.pose)
-        seen_by = _seen_by(fitted.camera or recording.camera, recording)
-        carrier_T_target = refit_target(fitted.pose, seen_by.subset(training))
-        for i in fold.tolist():
-            off = _residuals(fitted.pose, carrier_T_target, seen_by, i)
-            residuals[recording.sample_ids[i]] = off
-    found: dict[str, Any] = {"folds": len(parts), "failed_folds": failed, "samples": len(residuals)}
+    solved, counts = solve_folds(recording, usable, solve, rng)
+    for fold in solved:
+        pose = fold.estimate.pose
+        seen_by = _seen_by(fold.estimate.camera or recording.camera, recording)
+        carrier_T_target = refit_target(pose, seen_by.subset(fold.training))
+        for i in fold.left_out.tolist():
+            residuals[recording.sample_ids[i]] = _residuals(pose, carrier_T_target, seen_by, i)
+    found: dict[str, Any] = {**counts, "samples": len(residuals)}
+    answers = [fold.estimate.pose for fold in solved]
     if _solved_again(answers, estimate):
         found["fold_answers"] = [answer.tolist() for answer in answers]
     labels = pose_labels(recording, [recording.sample_ids.index(name) for name in residuals]).tolist()

@@ -12,14 +12,14 @@ from typing import Any
 import numpy as np
 
 from hecbench import statistics
-from hecbench.estimate import Estimate, Status
+from hecbench.estimate import Estimate
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
-from hecbench.samples.standstills import folds, pose_labels
+from hecbench.samples.standstills import pose_labels
 from hecbench.se3 import Array
 from hecbench.specs import EvaluatorSpec, Need, ResultSection
+from hecbench_plugins.left_out import solve_folds
 
-FOLDS = 5
 _NEEDS = frozenset({Need.MASKS, Need.ROBOT_MODEL, Need.JOINTS, Need.INTRINSICS})
 
 
@@ -64,20 +64,13 @@ def of_left_out_views(
 
     A fold on which the solver gives no answer is counted in `failed_folds` and predicts nothing.
     """
-    usable = masked_samples(recording)
+    solved, folds = solve_folds(recording, masked_samples(recording), solve, rng)
     found: list[float] = []
-    failed = 0
     used: list[int] = []
-    parts = folds(recording, usable, FOLDS, rng)
-    for fold in parts:
-        training = [i for i in usable if i not in fold]
-        fitted = solve(recording.subset(training))
-        if fitted.status is not Status.OK:
-            failed += 1
-            continue
-        found += overlaps(recording, fitted.pose, fold.tolist())
-        used += fold.tolist()
-    counts: dict[str, Any] = {"folds": len(parts), "failed_folds": failed, "samples": len(found)}
+    for fold in solved:
+        found += overlaps(recording, fold.estimate.pose, fold.left_out.tolist())
+        used += fold.left_out.tolist()
+    counts: dict[str, Any] = {**folds, "samples": len(found)}
     if not found:
         return counts
     mean = statistics.cluster_bootstrap(found, pose_labels(recording, used).tolist())
