@@ -223,6 +223,34 @@ def test_slack_is_kept_from_every_wall(ready_pose):
         check_motion(ARM, still, limits, slack_m=0.06)
 
 
+@pytest.mark.parametrize("wall", ["workspace", "box"])
+@pytest.mark.parametrize(
+    ("radius_m", "slack_m", "clear"), [(0.04, 0.0, True), (0.06, 0.0, False), (0.04, 0.02, False)]
+)
+def test_a_ball_of_the_tool_counts_to_its_surface_and_by_the_slack(
+    ready_pose, wall, radius_m, slack_m, clear
+):
+    """A wall 50 mm from its centre; the arm is far from it."""
+    base_T_flange = ARM.forward(ready_pose)
+    centre = se3.transform_points(base_T_flange, np.array([TIP.centre_m]))[0]
+    outwards = centre - base_T_flange[:3, 3]
+    axis = np.argmax(np.abs(outwards))
+    away = np.sign(outwards[axis]) * np.eye(3)[axis]
+    place = centre + 0.05 * away
+    limits = Limits(workspace=EVERYWHERE, tool=(replace(TIP, radius_m=radius_m),), arm_radius_m=0.0)
+    if wall == "box":
+        limits = replace(limits, keep_out=(Box(tuple(place - 1e-5), tuple(place + 1e-5)),))
+    else:
+        corners = np.where(away > 0, place, 9.0), np.where(away < 0, place, -9.0)
+        limits = replace(limits, workspace=Box(tuple(corners[1]), tuple(corners[0])))
+    still = JointMotion(ARM, ready_pose, ready_pose)
+    if clear:
+        check_motion(ARM, still, limits, slack_m)
+    else:
+        with pytest.raises(InputError, match="the tool"):
+            check_motion(ARM, still, limits, slack_m)
+
+
 @pytest.mark.parametrize("arm", ARMS.values(), ids=ARMS)
 def test_the_balls_of_the_arm_cover_its_links(arm, rng):
     """Every point of a tube around the links from the shoulder to the flange lies in one of them."""
