@@ -10,7 +10,7 @@ import time
 
 import numpy as np
 import pytest
-from hecbench_datasets import synthetic
+from hecbench_datasets.suites import synthetic
 
 from hecbench import registry
 from hecbench.specs import Kind, SolverSpec

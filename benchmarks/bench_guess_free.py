@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hecbench_datasets import guess_free
+from hecbench_datasets.suites import guess_free
 from hecbench_plugins.solvers.render_gn_free import render_gn_free
 
 from hecbench import se3, statistics

@@ -17,7 +17,7 @@ from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
-from hecbench_datasets import kinhec
+from hecbench_datasets.formats import kinhec
 
 from hecbench import registry, se3
 from hecbench.errors import InputError

@@ -14,8 +14,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import cv2
 import numpy as np
+from hecbench_datasets.suites.synthetic_markers import PRESETS, generate, make
 from hecbench_datasets.synthetic_faults import FAULTS, arm_recording
-from hecbench_datasets.synthetic_markers import PRESETS, generate, make
 from hecbench_datasets.synthetic_misreadings import MISREADINGS, near_board
 from hecbench_plugins.markers.reprojection import corner_problem
 from hecbench_plugins.solvers.bundle import Bundle

@@ -9,7 +9,7 @@ import os
 
 import numpy as np
 import pytest
-from hecbench_datasets import maskless as suites
+from hecbench_datasets.suites import maskless as suites
 
 from hecbench import registry
 from hecbench.errors import InputError

@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hecbench_datasets import guess_free, synthetic
+from hecbench_datasets.suites import guess_free, synthetic
 from hecbench_plugins.solvers.render_gn import render_gn
 from scipy import ndimage
 

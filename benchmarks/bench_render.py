@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hecbench_datasets import synthetic
+from hecbench_datasets.suites import synthetic
 from hecbench_plugins.second_order.descent import Trace
 from hecbench_plugins.second_order.photometry import Photometry
 from hecbench_plugins.solvers.render_gn import render_gn

@@ -21,8 +21,8 @@ os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("HECBENCH_THREADS", "1")
 
 import numpy as np
+from hecbench_datasets.suites.synthetic_markers import make
 from hecbench_datasets.synthetic_faults import FAULTS, arm_recording
-from hecbench_datasets.synthetic_markers import make
 from joblib import Parallel, delayed
 
 from hecbench import preparation, se3

@@ -1,4 +1,4 @@
-"""Recordings: one file per format or generator."""
+"""Recordings: other people's formats, and generated ones."""
 
-plugin_folders = (".",)
+plugin_folders = ("formats", "suites")
 """Folders whose modules are plugins, imported one by one when plugins are listed."""

@@ -17,7 +17,7 @@ from hecbench.running import runner
 from hecbench.running.solving import Options
 from hecbench.storage import recording_io
 from hecbench.system import files
-from hecbench_datasets import lerobot
+from hecbench_datasets.formats import lerobot
 from hecbench_datasets.reading.lerobot_files import description
 
 _DRIFT_MM, _DRIFT_DEG = 10.0, 1.0

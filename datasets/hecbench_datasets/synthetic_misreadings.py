@@ -17,8 +17,8 @@ from hecbench.lens import EQUIDISTANT, OPENCV, CameraModel, distort, project
 from hecbench.recording import Mounting, Recording
 from hecbench.se3 import Array
 from hecbench.targets import ChessboardTarget
+from hecbench_datasets.suites.synthetic_markers import MarkerSetting, generate
 from hecbench_datasets.synthetic_faults import Fault
-from hecbench_datasets.synthetic_markers import MarkerSetting, generate
 
 _FILM_STEP_S, _FILM_GAP_S = 1.5, 0.1
 """From pose to pose, and from frame to frame, where a recording's poses become a film."""

@@ -88,7 +88,7 @@ def test_bad_usage(hecbench, refused, tmp_path):
 
 
 def test_an_unreadable_image_costs_its_sample_only(hecbench, tmp_path):
-    from hecbench_datasets import photographs
+    from hecbench_datasets.suites import photographs
 
     shutil.copytree(photographs.FOLDER, tmp_path / "cell")
     damaged, missing = (tmp_path / "cell" / "images" / name for name in ("img05.jpg", "img12.jpg"))

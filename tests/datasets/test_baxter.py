@@ -4,7 +4,7 @@ import pickle
 
 import numpy as np
 import pytest
-from hecbench_datasets import baxter
+from hecbench_datasets.formats import baxter
 from hecbench_datasets.reading.arms import BAXTER_END_EFFECTOR_M, BAXTER_LEFT
 from hecbench_plugins.evaluators.keypoints import add, pck
 

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from hecbench_datasets import bop
+from hecbench_datasets.formats import bop
 
 from hecbench import se3
 from hecbench.errors import InputError

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hecbench_datasets import ctrnet
+from hecbench_datasets.formats import ctrnet
 
 from hecbench import se3
 from hecbench.errors import InputError

@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 import pytest
-from hecbench_datasets import dream
+from hecbench_datasets.formats import dream
 from hecbench_datasets.reading.arms import PANDA
 
 from hecbench import se3

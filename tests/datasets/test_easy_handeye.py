@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import yaml
-from hecbench_datasets import easy_handeye
+from hecbench_datasets.formats import easy_handeye
 
 from hecbench import se3
 from hecbench.errors import InputError

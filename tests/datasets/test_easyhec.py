@@ -5,7 +5,7 @@ import zipfile
 
 import numpy as np
 import pytest
-from hecbench_datasets import easyhec
+from hecbench_datasets.formats import easyhec
 
 from hecbench import se3
 from hecbench.errors import InputError

@@ -5,7 +5,7 @@ import shutil
 
 import numpy as np
 import pytest
-from hecbench_datasets import franka_charuco
+from hecbench_datasets.formats import franka_charuco
 
 from hecbench import se3
 from hecbench.errors import InputError

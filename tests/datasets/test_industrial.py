@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hecbench_datasets import industrial, industrial_kinematic
+from hecbench_datasets.formats import industrial, industrial_kinematic
 
 from hecbench.errors import InputError
 from hecbench.recording import Mounting

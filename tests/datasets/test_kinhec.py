@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hecbench_datasets import kinhec
+from hecbench_datasets.formats import kinhec
 
 from hecbench import se3
 from hecbench.errors import InputError

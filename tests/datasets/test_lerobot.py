@@ -5,7 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hecbench_datasets import episodes, lerobot
+from hecbench_datasets import episodes
+from hecbench_datasets.formats import lerobot
 
 from hecbench import se3
 from hecbench.errors import InputError

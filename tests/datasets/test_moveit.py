@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 import yaml
-from hecbench_datasets import moveit
+from hecbench_datasets.formats import moveit
 
 from hecbench.errors import InputError
 from hecbench.recording import Mounting

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hecbench_datasets import paper, synthetic
+from hecbench_datasets.suites import paper, synthetic
 
 from hecbench import registry
 from hecbench.specs import Kind, SolverSpec, SuiteSpec

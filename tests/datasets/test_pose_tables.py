@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hecbench_datasets import pose_tables
+from hecbench_datasets.formats import pose_tables
 from scipy.spatial.transform import Rotation
 
 from hecbench import se3

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hecbench_datasets import synthetic
+from hecbench_datasets.suites import synthetic
 
 from hecbench import se3
 

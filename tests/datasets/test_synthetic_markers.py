@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hecbench_datasets.synthetic_markers import PRESETS, WORKSPACE_CENTRE_M, generate, make
+from hecbench_datasets.suites.synthetic_markers import PRESETS, WORKSPACE_CENTRE_M, generate, make
 from hecbench_plugins.markers.target_poses import target_poses
 
 from hecbench import se3

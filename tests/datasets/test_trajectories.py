@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hecbench_datasets import trajectories
+from hecbench_datasets.formats import trajectories
 
 from hecbench import se3
 from hecbench.errors import InputError

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hecbench_datasets import visp
+from hecbench_datasets.formats import visp
 
 from hecbench.errors import InputError
 from hecbench.recording import Mounting

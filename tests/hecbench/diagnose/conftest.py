@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from hecbench_datasets.suites.synthetic_markers import make
 from hecbench_datasets.synthetic_faults import FAULTS, arm_recording
-from hecbench_datasets.synthetic_markers import make
 
 from hecbench import preparation
 from hecbench.diagnose import check

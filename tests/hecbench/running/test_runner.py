@@ -86,7 +86,7 @@ def test_start_and_truth_are_kept_of_every_run(exact_rig):
 
 
 def test_facts_of_an_item_come_with_its_results():
-    from hecbench_datasets import synthetic
+    from hecbench_datasets.suites import synthetic
 
     task = Task(("park",), suite="synthetic", level="mismatch_3", index=2)
     (estimate,), _ = runner.execute(task, Options(seed=1))

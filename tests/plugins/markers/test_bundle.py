@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hecbench_datasets.synthetic_markers import PRESETS, generate, make
+from hecbench_datasets.suites.synthetic_markers import PRESETS, generate, make
 from hecbench_plugins.markers.reprojection import corner_problem
 from hecbench_plugins.solvers.bundle import Bundle, IntrinsicsPrior
 from hecbench_plugins.solvers.bundle_fixed import bundle_fixed

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hecbench_datasets.synthetic_markers import PRESETS, generate
+from hecbench_datasets.suites.synthetic_markers import PRESETS, generate
 from hecbench_plugins.markers.target_poses import planar_candidates, project, target_poses
 
 from hecbench import se3

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hecbench_datasets import maskless as suites
+from hecbench_datasets.suites import maskless as suites
 from hecbench_plugins.solvers.render_gn import render_gn
 from hecbench_plugins.solvers.render_gn_free import render_gn_free
 

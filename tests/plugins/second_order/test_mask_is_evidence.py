@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hecbench_datasets import synthetic
+from hecbench_datasets.suites import synthetic
 from hecbench_plugins.second_order.descent import Trace
 from hecbench_plugins.second_order.flatness import MOST_UNEVEN, unevenness
 from hecbench_plugins.second_order.photometry import Photometry

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hecbench_datasets import synthetic
+from hecbench_datasets.suites import synthetic
 from hecbench_plugins.segmenters.background import by_background
 from hecbench_plugins.segmenters.given import given
 from hecbench_plugins.segmenters.grabcut import GrabCut

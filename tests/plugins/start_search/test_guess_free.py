@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
-from hecbench_datasets import guess_free as suite
+from hecbench_datasets.suites import guess_free as suite
 from hecbench_plugins.solvers.render_gn_free import render_gn_free
 from hecbench_plugins.start_search.view_sphere import ViewSphere, best_apart, look_at
 

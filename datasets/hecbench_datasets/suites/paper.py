@@ -19,7 +19,7 @@ from collections.abc import Iterable
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import SuiteSpec
-from hecbench_datasets import synthetic
+from hecbench_datasets.suites import synthetic
 
 ABLATIONS = {
     "lambda_cen": ("0", "0.1", "0.01", "0.001", "0.0001"),

@@ -30,7 +30,7 @@ from hecbench.recording import CameraModel, Mounting, Recording, RobotDescriptio
 from hecbench.registry import hookimpl
 from hecbench.se3 import Array
 from hecbench.specs import SuiteSpec
-from hecbench_datasets.synthetic import BASE, FLANGE, FOCAL_PX, HEIGHT, ROBOT, WIDTH, robot_and_mesh
+from hecbench_datasets.suites.synthetic import BASE, FLANGE, FOCAL_PX, HEIGHT, ROBOT, WIDTH, robot_and_mesh
 
 LEVELS = {"free": 1, "free_3": 3, "free_5": 5}
 """Views by level."""

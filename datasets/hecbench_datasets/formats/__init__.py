@@ -1,0 +1,1 @@
+"""Other people's formats: one file per format, each a plugin."""

@@ -1,0 +1,1 @@
+"""Generated recordings: one file per suite, each a plugin."""
