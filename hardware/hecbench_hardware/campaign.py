@@ -23,6 +23,7 @@ import numpy as np
 from hecbench.errors import HecbenchError, InputError
 from hecbench.recording import CameraModel, Mounting, Recording
 from hecbench.storage import recording_io
+from hecbench.system import pictures
 from hecbench_hardware.cameras.images import ImageFolder
 from hecbench_hardware.controller_sim.process import SimulatedController
 from hecbench_hardware.devices import DeviceFault
@@ -219,7 +220,7 @@ def _make_pictures(folder: Path) -> None:
     folder.mkdir(parents=True)
     for k in range(3):
         picture = np.full((12, 16, 3), 80 * k, np.uint8)
-        (folder / f"{k}.png").write_bytes(recording_io.encode_png(picture))
+        (folder / f"{k}.png").write_bytes(pictures.encode_png(picture))
 
 
 def _complaints(outcome: Outcome, trial: _Trial) -> Iterator[str]:

@@ -101,8 +101,8 @@ def _draw(model: RobotModel, positions: NDArray[np.float64], path: Path) -> None
     from hecbench import se3
     from hecbench.rendering import Renderer, RenderMesh
     from hecbench.robots.extent import placed
-    from hecbench.storage.recording_io import encode_png
     from hecbench.system import files
+    from hecbench.system.pictures import encode_png
 
     mesh = RenderMesh.of(model)
     points = placed(model, positions)

@@ -1,126 +1,35 @@
-"""An estimate in the formats that robots are set up with.
-
-The estimate is about the camera's optical frame (z forward, x right, y down). A driver usually publishes that
-frame below its own `camera_link`; publishing it below the robot too would give it two parents. So with `child`
-the transform to the child is written, composed with the known child_T_optical, and tf stays a tree.
-"""
+"""An estimate in the formats that robots are set up with; `placement` says which frame is placed."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import msgspec
 import numpy as np
 
 from hecbench import se3
 from hecbench.errors import InputError
-from hecbench.estimate import Estimate, Status, plain
+from hecbench.estimate import Estimate, plain
+from hecbench.exchange.placement import (
+    CAMERA_CHANGED,
+    OPTICAL,
+    OPTIONS,
+    Placement,
+    frame_name,
+    placement,
+    rounded,
+    text,
+)
 from hecbench.lens import EQUIDISTANT, CameraModel
 from hecbench.recording import Mounting
 from hecbench.se3 import Array
-
-OPTIONS = {
-    "parent": "name of the parent frame; default: the estimate's parent_link",
-    "child": "frame to place, such as camera_link; default: the optical frame itself",
-    "optical": "name of the camera's optical frame; default: camera_optical_frame",
-    "child_T_optical": "'x y z qx qy qz qw' of the optical frame in the child, as `tf2_echo CHILD OPTICAL` "
-    "prints it; default: no offset and the axes of REP 103",
-    "other_link": "the robot's other end, flange or base, where a format names both",
-    "marker": "name of the target's frame, where a format names it",
-}
-"""What `options` may hold; the command line offers each as --name."""
-
-CAMERA_CHANGED = (
-    "WARNING: the method changed the camera: use this pose with this camera, not with the recording's"
-)
-
-_OPTICAL = "camera_optical_frame"
-_REP_103 = se3.make([[0, 0, 1], [-1, 0, 0], [0, -1, 0]], [0, 0, 0])
-"""link_T_optical: the link looks along x with z up, the optical frame along z with y down."""
-_FRAME_NAME = re.compile(r"[A-Za-z_][\w/.\-]*")
-
-
-@dataclass(frozen=True, eq=False)
-class Placement:
-    """Where the child frame goes: parent_T_child (4, 4) m, and what is to be known of it, sentences for comments."""
-
-    parent: str
-    child: str
-    parent_T_child: Array
-    comments: tuple[str, ...]
-
-    @property
-    def xyz(self) -> list[float]:
-        """Translation, m."""
-        return _rounded(self.parent_T_child[:3, 3])
-
-    @property
-    def quat_xyzw(self) -> list[float]:
-        """Quaternion x, y, z, w."""
-        return _rounded(se3.to_quat_xyzw(self.parent_T_child))
-
-    @property
-    def rpy(self) -> list[float]:
-        """Roll, pitch, yaw (rad) about the fixed axes x, y, z, as in URDF."""
-        return _rounded(se3.to_rpy(self.parent_T_child[:3, :3]))
-
-
-def placement(estimate: Estimate, options: Mapping[str, str]) -> Placement:
-    """The transform to write.
-
-    Raises:
-        InputError: there is no answer to export, an option is unknown, or a frame name or a transform is not
-            one.
-    """
-    if estimate.status is not Status.OK or estimate.parent_T_camera is None:
-        raise InputError(
-            f"estimate of '{estimate.solver}' is {estimate.status} ({estimate.reason}): nothing to export"
-        )
-    for name in options:
-        if name not in OPTIONS:
-            raise InputError(f"export: option '{name}' is unknown; known are {', '.join(OPTIONS)}")
-    parent = _frame(options.get("parent") or estimate.parent_link)
-    optical = _frame(options.get("optical") or _OPTICAL)
-    child = _frame(options.get("child") or optical)
-    if parent == child:
-        raise InputError(f"export: '{parent}' cannot be its own child; name another --child")
-    origin = re.sub(r"[^\w .:/+-]+|-{2,}", "_", f"{estimate.solver} on {estimate.recording}")
-    camera = _camera_comments(estimate)
-    if child == optical:
-        first = f"{origin}, the camera's optical frame"
-        return Placement(parent, child, estimate.parent_T_camera, (first, *camera))
-    given = options.get("child_T_optical")
-    child_T_optical = _REP_103 if given is None else _transform(given)
-    how = "as given" if given else f"by REP 103 without offset: compare `tf2_echo {child} {optical}`"
-    return Placement(
-        parent,
-        child,
-        estimate.parent_T_camera @ se3.inverse(child_T_optical),
-        (f"{origin}; {child} to {optical} {how}", *camera),
-    )
-
-
-def _camera_comments(estimate: Estimate) -> tuple[str, ...]:
-    """The camera that belongs to the pose, and a warning where it is not the recording's."""
-    camera = estimate.camera
-    if camera is None or camera.K is None:
-        return ()
-    (fx, _, cx), (_, fy, cy) = camera.K[:2]
-    lens = " ".join(map(_text, camera.distortion)) or "none"
-    said = (
-        f"camera: fx {_text(fx)} fy {_text(fy)} cx {_text(cx)} cy {_text(cy)}, {camera.width}x{camera.height} px, "
-        f"distortion ({camera.distortion_model}) {lens}"
-    )
-    return (said, CAMERA_CHANGED) if estimate.diagnostics.get("camera_changed") else (said,)
 
 
 def ros_static_transform(estimate: Estimate, options: Mapping[str, str]) -> str:
     """A shell line that publishes the transform: ROS 2, and ROS 1 as a comment."""
     at = placement(estimate, options)
-    x, y, z = map(_text, at.xyz)
-    qx, qy, qz, qw = map(_text, at.quat_xyzw)
+    x, y, z = map(text, at.xyz)
+    qx, qy, qz, qw = map(text, at.quat_xyzw)
     return (
         f"{_lines('# ', at)}"
         f"ros2 run tf2_ros static_transform_publisher --x {x} --y {y} --z {z} "
@@ -138,7 +47,7 @@ def urdf_joint(estimate: Estimate, options: Mapping[str, str]) -> str:
         f'<joint name="{at.parent}_to_{at.child}" type="fixed">\n'
         f'  <parent link="{at.parent}"/>\n'
         f'  <child link="{at.child}"/>\n'
-        f'  <origin xyz="{" ".join(map(_text, at.xyz))}" rpy="{" ".join(map(_text, at.rpy))}"/>\n'
+        f'  <origin xyz="{" ".join(map(text, at.xyz))}" rpy="{" ".join(map(text, at.rpy))}"/>\n'
         "</joint>\n"
     )
 
@@ -156,7 +65,7 @@ def json_transform(estimate: Estimate, options: Mapping[str, str]) -> str:
         "matrix": at.parent_T_child,
         "translation_m": at.xyz,
         "quaternion_xyzw": at.quat_xyzw,
-        "rotvec_rad": _rounded(se3.so3_log(at.parent_T_child[:3, :3])),
+        "rotvec_rad": rounded(se3.so3_log(at.parent_T_child[:3, :3])),
         "rpy_rad": at.rpy,
         "covariance_parent_rad_m": estimate.covariance,
         "camera": estimate.to_json()["camera"],
@@ -169,7 +78,7 @@ def easy_handeye(estimate: Estimate, options: Mapping[str, str]) -> str:
     """The calibration file that easy_handeye's publisher reads."""
     at = placement(estimate, options)
     on_hand = estimate.mounting is Mounting.EYE_IN_HAND
-    other = _frame(options.get("other_link") or ("base_link" if on_hand else "tool0"))
+    other = frame_name(options.get("other_link") or ("base_link" if on_hand else "tool0"))
     base, effector = (other, at.parent) if on_hand else (at.parent, other)
     names = dict(zip(("x", "y", "z", "qx", "qy", "qz", "qw"), [*at.xyz, *at.quat_xyzw], strict=True))
     parameters = {
@@ -181,20 +90,20 @@ def easy_handeye(estimate: Estimate, options: Mapping[str, str]) -> str:
         "robot_base_frame": base,
         "robot_effector_frame": effector,
         "tracking_base_frame": at.child,
-        "tracking_marker_frame": _frame(options.get("marker") or "target"),
+        "tracking_marker_frame": frame_name(options.get("marker") or "target"),
     }
     lines = [
         *(f"# {comment}" for comment in at.comments),
         "parameters:",
         *(f"  {key}: {value}" for key, value in parameters.items()),
     ]
-    return "\n".join([*lines, "transformation:", *(f"  {k}: {_text(v)}" for k, v in names.items())]) + "\n"
+    return "\n".join([*lines, "transformation:", *(f"  {k}: {text(v)}" for k, v in names.items())]) + "\n"
 
 
 def moveit_launch(estimate: Estimate, options: Mapping[str, str]) -> str:
     """A ROS 1 launch file like the one that moveit_calibration saves."""
     at = placement(estimate, options)
-    numbers = " ".join(map(_text, [*at.xyz, *at.quat_xyzw]))
+    numbers = " ".join(map(text, [*at.xyz, *at.quat_xyzw]))
     return (
         "<launch>\n"
         f"{_lines('  <!-- ', at, ' -->')}"
@@ -208,7 +117,7 @@ def moveit_launch_ros2(estimate: Estimate, options: Mapping[str, str]) -> str:
     """A ROS 2 launch file (Python) with the static transform."""
     at = placement(estimate, options)
     values = dict(zip(("x", "y", "z", "qx", "qy", "qz", "qw"), [*at.xyz, *at.quat_xyzw], strict=True))
-    arguments = [part for key, value in values.items() for part in (f"--{key}", _text(value))]
+    arguments = [part for key, value in values.items() for part in (f"--{key}", text(value))]
     arguments += ["--frame-id", at.parent, "--child-frame-id", at.child]
     return (
         f"{_lines('# ', at)}\n"
@@ -252,7 +161,7 @@ def camera_info(estimate: Estimate, options: Mapping[str, str]) -> str:
     content = {
         "image_width": camera.width,
         "image_height": camera.height,
-        "camera_name": options.get("optical", _OPTICAL).removesuffix("_optical_frame"),
+        "camera_name": options.get("optical", OPTICAL).removesuffix("_optical_frame"),
         "camera_matrix": matrix(camera.K),
         "distortion_model": name,
         "distortion_coefficients": matrix(coefficients[None]),
@@ -279,31 +188,3 @@ def _ros_lens(camera: CameraModel) -> tuple[str, int]:
 def _lines(before: str, at: Placement, after: str = "") -> str:
     """A comment line for each comment."""
     return "".join(f"{before}{comment}{after}\n" for comment in at.comments)
-
-
-def _frame(name: str) -> str:
-    if not _FRAME_NAME.fullmatch(name):
-        raise InputError(
-            f"export: '{name}' is not a frame name: letters, digits, _ / . - and no leading slash"
-        )
-    return name
-
-
-def _transform(text: str) -> Array:
-    try:
-        numbers = np.array(text.replace(",", " ").split(), float)
-    except ValueError:
-        numbers = np.zeros(0)
-    if numbers.shape != (7,) or not np.isfinite(numbers).all() or abs(np.linalg.norm(numbers[3:]) - 1) > 1e-2:
-        raise InputError(
-            f"export: child_T_optical '{text}' is not 'x y z qx qy qz qw' with a unit quaternion"
-        )
-    return se3.from_quat_xyzw(numbers[3:], numbers[:3])
-
-
-def _rounded(values: Array) -> list[float]:
-    return [float(value) for value in np.round(values, 12) + 0.0]
-
-
-def _text(value: float) -> str:
-    return f"{value:.10f}".rstrip("0").rstrip(".")

@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import io
 import zipfile
-from collections.abc import Callable
-from itertools import count
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -15,118 +13,26 @@ from numpy.typing import NDArray
 
 from hecbench.errors import InputError
 from hecbench.estimate import plain
-from hecbench.lens import OPENCV, CameraModel
-from hecbench.recording import ImageSource, Mounting, Recording, RobotDescription
+from hecbench.lens import CameraModel
+from hecbench.recording import ImageSource, Recording, RobotDescription
 from hecbench.robots import urdf_files
-from hecbench.system import files, pictures
+from hecbench.storage.recording_pictures import store_pictures
+from hecbench.storage.recording_schema import (
+    SCHEMA,
+    CameraJson,
+    PointsJson,
+    RecordingJson,
+    RobotJson,
+    SampleJson,
+    TargetJson,
+)
+from hecbench.system import files
 from hecbench.targets import DECLARED, PointsTarget, Target
 
-SCHEMA = "hecbench.recording/1"
 FILE_NAME = "recording.json"
 ARRAYS_NAME = "samples.npz"
 
-Matrix = list[list[float]]
-Count = Annotated[int, msgspec.Meta(ge=0, le=100_000)]
-
-
-class _Strict(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
-    pass
-
-
-class _Robot(_Strict):
-    model: str | None = None
-    urdf: str | None = None
-    base_link: str | None = None
-    flange_link: str | None = None
-    joint_names: list[str] | None = None
-
-
-class _Camera(_Strict):
-    width: Count
-    height: Count
-    K: Matrix | None = None
-    distortion: list[float] | None = None
-    distortion_model: str = OPENCV
-
-
-class _Points(_Strict, tag_field="kind", tag="points"):
-    points_m: Matrix
-
-
-class _Chessboard(_Strict, tag_field="kind", tag="chessboard"):
-    columns: Count
-    rows: Count
-    square_m: float
-
-
-class _Charuco(_Strict, tag_field="kind", tag="charuco"):
-    columns: Count
-    rows: Count
-    square_m: float
-    marker_m: float
-    dictionary: str
-    legacy: bool | None = None
-
-
-class _AprilTag(_Strict, tag_field="kind", tag="apriltag"):
-    family: str
-    id: Annotated[int, msgspec.Meta(ge=-1, le=100_000)]
-    size_m: float
-
-
-class _Aruco(_Strict, tag_field="kind", tag="aruco"):
-    dictionary: str
-    id: Count
-    size_m: float
-
-
-class _ArucoGrid(_Strict, tag_field="kind", tag="aruco_grid"):
-    columns: Count
-    rows: Count
-    marker_m: float
-    gap_m: float
-    dictionary: str
-    first_id: Count = 0
-
-
-class _AprilGrid(_Strict, tag_field="kind", tag="aprilgrid"):
-    columns: Count
-    rows: Count
-    tag_m: float
-    spacing: float
-    family: str = "tag36h11"
-    first_id: Count = 0
-
-
-_Target = _Points | _Chessboard | _Charuco | _AprilTag | _Aruco | _ArucoGrid | _AprilGrid
-
-
-class _Sample(_Strict):
-    id: str
-    robot_stamp_s: float | None = None
-    camera_stamp_s: float | None = None
-    base_T_flange: Matrix | None = None
-    joints_rad: list[float] | None = None
-    camera_T_target: Matrix | None = None
-    corners_px: list[list[float] | None] | None = None
-    image: str | None = None
-    mask: str | None = None
-    depth: str | None = None
-
-
-class _Recording(_Strict):
-    schema: Literal["hecbench.recording/1"]
-    name: str
-    mounting: Mounting
-    samples: list[_Sample]
-    robot: _Robot | None = None
-    camera: _Camera | None = None
-    target: _Target | None = None
-    initial_parent_T_camera: Matrix | None = None
-    truth_parent_T_camera: Matrix | None = None
-
-
-_DECODER = msgspec.json.Decoder(_Recording)
+_DECODER = msgspec.json.Decoder(RecordingJson)
 _ARRAYS = {
     "robot_stamp_s": (),
     "camera_stamp_s": (),
@@ -164,7 +70,7 @@ def load(path: str | Path) -> Recording:
         raise InputError(f"{file}: {error}") from error
 
 
-def _build(parsed: _Recording, folder: Path) -> Recording:
+def _build(parsed: RecordingJson, folder: Path) -> Recording:
     from_file = _read_arrays(folder / ARRAYS_NAME, len(parsed.samples))
     arrays: dict[str, Any] = {name: _stack(name, shape, parsed.samples) for name, shape in _ARRAYS.items()}
     for name in from_file:
@@ -188,7 +94,7 @@ def _build(parsed: _Recording, folder: Path) -> Recording:
     )
 
 
-def _robot(parsed: _Robot | None, folder: Path) -> RobotDescription | None:
+def _robot(parsed: RobotJson | None, folder: Path) -> RobotDescription | None:
     if parsed is None:
         return None
     return RobotDescription(
@@ -200,7 +106,7 @@ def _robot(parsed: _Robot | None, folder: Path) -> RobotDescription | None:
     )
 
 
-def _camera(parsed: _Camera | None) -> CameraModel | None:
+def _camera(parsed: CameraJson | None) -> CameraModel | None:
     if parsed is None:
         return None
     K = _optional_array("camera.K", parsed.K)
@@ -208,11 +114,11 @@ def _camera(parsed: _Camera | None) -> CameraModel | None:
     return CameraModel(parsed.width, parsed.height, K, distortion, parsed.distortion_model)
 
 
-def _target(parsed: _Target | None) -> Target | None:
+def _target(parsed: TargetJson | None) -> Target | None:
     match parsed:
         case None:
             return None
-        case _Points(points_m=points_m):
+        case PointsJson(points_m=points_m):
             return PointsTarget(tuple(tuple(point) for point in points_m))
         case _:
             given = {key: value for key, value in msgspec.structs.asdict(parsed).items() if value is not None}
@@ -231,7 +137,7 @@ def _optional_array(name: str, value: Any) -> NDArray[np.float64] | None:
     return None if value is None else _array(name, value)
 
 
-def _stack(name: str, shape: tuple[int, ...] | None, samples: list[_Sample]) -> NDArray[np.float64] | None:
+def _stack(name: str, shape: tuple[int, ...] | None, samples: list[SampleJson]) -> NDArray[np.float64] | None:
     """One array over all samples, NaN where a sample lacks it."""
     given = {
         i: getattr(sample, name) for i, sample in enumerate(samples) if getattr(sample, name) is not None
@@ -300,9 +206,9 @@ def save(recording: Recording, folder: str | Path) -> None:
     The JSON file is written last and atomically, so a folder with `recording.json` is complete.
     """
     folder = Path(folder)
-    images = _store_pictures(recording.images, folder, "images", recording.sample_ids)
-    masks = _store_pictures(recording.masks, folder, "masks", recording.sample_ids)
-    depths = _store_pictures(recording.depths, folder, "depths", recording.sample_ids)
+    images = store_pictures(recording.images, folder, "images", recording.sample_ids)
+    masks = store_pictures(recording.masks, folder, "masks", recording.sample_ids)
+    depths = store_pictures(recording.depths, folder, "depths", recording.sample_ids)
     samples = [
         {"id": recording.sample_ids[i]}
         | {name: _sample_value(getattr(recording, name), i) for name in _ARRAYS}
@@ -355,67 +261,6 @@ def target_json(target: Target | None) -> dict[str, Any] | None:
         case _:
             declared = [name for name in target.__annotations__ if name != "kind"]
             return {"kind": target.kind} | {name: getattr(target, name) for name in declared}
-
-
-def _store_pictures(
-    sources: tuple[ImageSource, ...] | None, folder: Path, kind: str, ids: tuple[str, ...]
-) -> list[str | None]:
-    if sources is None:
-        return [None] * len(ids)
-    stored = {
-        source: source.resolve().relative_to(folder.resolve()).as_posix()
-        for source in sources
-        if isinstance(source, Path) and source.resolve().is_relative_to(folder.resolve())
-    }
-    taken = {name.casefold() for name in stored.values()}
-    names: list[str | None] = []
-    for sample_id, source in zip(ids, sources, strict=True):
-        if source is None:
-            names.append(None)
-        elif isinstance(source, np.ndarray):
-            name = _free_name(kind, f"{files.safe_name(sample_id)}.png", taken)
-            where = f"samples[{len(names)}].{kind.removesuffix('s')}"
-            files.write_bytes(folder / name, encode_png(_STORED[kind](source, where)))
-            names.append(name)
-        else:
-            if source not in stored:
-                stored[source] = _free_name(kind, files.safe_name(source.name), taken)
-                files.write_bytes(folder / stored[source], files.read_bytes(source))
-            names.append(stored[source])
-    return names
-
-
-def _mask_picture(mask: NDArray[Any], where: str) -> NDArray[np.uint8]:
-    return pictures.mask(mask, where).astype(np.uint8) * np.uint8(255)
-
-
-def _depth_picture(depth: NDArray[Any], where: str) -> NDArray[np.uint16]:
-    return np.asarray(np.rint(1e3 * pictures.depth(depth, where)), np.uint16)
-
-
-_STORED: dict[str, Callable[[NDArray[Any], str], NDArray[Any]]] = {
-    "images": pictures.image,
-    "masks": _mask_picture,
-    "depths": _depth_picture,
-}
-
-
-def _free_name(kind: str, name: str, taken: set[str]) -> str:
-    """A name below `kind` that no other picture has, on file systems that ignore case too."""
-    stem, suffix = Path(name).stem, Path(name).suffix
-    tries = (f"{kind}/{stem}{'' if i == 1 else f'_{i}'}{suffix}" for i in count(1))
-    free = next(path for path in tries if path.casefold() not in taken)
-    taken.add(free.casefold())
-    return free
-
-
-def encode_png(picture: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
-    """PNG bytes of (H, W, 3) RGB, or (H, W) grey of 8 or 16 bits."""
-    from PIL import Image
-
-    stream = io.BytesIO()
-    Image.fromarray(picture).save(stream, "PNG")
-    return stream.getvalue()
 
 
 def _copied_robot(urdf: Path, folder: Path) -> str:

@@ -192,3 +192,12 @@ def _eight_bit(array: NDArray[Any], where: str) -> Image:
             f"{where}: the values of this 16-bit image end at {high:g} of 65535; scale them to the full range"
         )
     return np.asarray((np.asarray(array, np.uint32) * 255 + 32767) // 65535, np.uint8)
+
+
+def encode_png(picture: NDArray[np.uint8] | NDArray[np.uint16]) -> bytes:
+    """PNG bytes of (H, W, 3) RGB, or (H, W) grey of 8 or 16 bits."""
+    from PIL import Image
+
+    stream = io.BytesIO()
+    Image.fromarray(picture).save(stream, "PNG")
+    return stream.getvalue()

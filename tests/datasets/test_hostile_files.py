@@ -18,7 +18,7 @@ from hecbench.recording import Mounting, Recording
 from hecbench.robots import urdf_files
 from hecbench.specs import DatasetSpec, Kind
 from hecbench.storage import recording_io
-from hecbench.system import files
+from hecbench.system import files, pictures
 
 NINE = range(1, 12)
 BOMBS = {
@@ -138,10 +138,10 @@ def test_pictures_of_one_name_in_two_folders_stay_two(tmp_path):
     for folder, level in (("a", 10), ("b", 200), ("B", 90)):
         (tmp_path / "src" / folder).mkdir(parents=True)
         sources.append(tmp_path / "src" / folder / ("x.png" if folder != "B" else "X.png"))
-        sources[-1].write_bytes(recording_io.encode_png(np.full((4, 5), level, np.uint8)))
+        sources[-1].write_bytes(pictures.encode_png(np.full((4, 5), level, np.uint8)))
     own = tmp_path / "out" / "images" / "x_2.png"
     own.parent.mkdir(parents=True)
-    own.write_bytes(recording_io.encode_png(np.full((4, 5), 60, np.uint8)))
+    own.write_bytes(pictures.encode_png(np.full((4, 5), 60, np.uint8)))
     recording = Recording(
         name="two",
         mounting=Mounting.EYE_TO_HAND,

@@ -10,7 +10,7 @@ from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.preparation import load_recording
 from hecbench.recording import Mounting
-from hecbench.storage.recording_io import encode_png
+from hecbench.system.pictures import encode_png
 
 rosbags = pytest.importorskip("rosbags", reason="the extra 'bags' is not installed")
 

@@ -25,8 +25,8 @@ from hecbench.recording import CameraModel, Mounting, Recording
 from hecbench.registry import hookimpl
 from hecbench.se3 import Array
 from hecbench.specs import DatasetSpec
-from hecbench.storage.recording_io import encode_png
 from hecbench.system import files
+from hecbench.system.pictures import encode_png
 from hecbench_datasets.reading import bags, kalibr
 from hecbench_datasets.reading.hints import Hints, hinted_target, hints_for
 from hecbench_datasets.reading.joint_poses import BASES, FLANGES, RobotReading, joint_readings

@@ -13,8 +13,8 @@ from hecbench.errors import InputError
 from hecbench.recording import CameraModel
 from hecbench.se3 import Array
 from hecbench.storage import trial_record
-from hecbench.storage.recording_io import encode_png
 from hecbench.system import files
+from hecbench.system.pictures import encode_png
 from hecbench_hardware import tag_edges, tags
 from hecbench_hardware.lab import cells
 from hecbench_hardware.lab.cells import Station

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench.errors import HecbenchError, InputError
-from hecbench.storage.recording_io import encode_png
 from hecbench.system import files
+from hecbench.system.pictures import encode_png
 
 FILE_NAME = "session.jsonl"
 PLAN_NAME = "plan.json"

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench.recording import Recording
-from hecbench.storage.recording_io import encode_png
 from hecbench.system import files
+from hecbench.system.pictures import encode_png
 
 Picture = NDArray[np.uint8]
 
