@@ -91,8 +91,7 @@ def squares_not_square(recording: Recording, rng: np.random.Generator) -> Record
     pitch = rng.choice([0.97, 0.98, 1.02, 1.03])
     grid = corners.reshape(len(corners), target.rows, target.columns, 2)
     stretched = _stretched(grid, float(pitch)).reshape(corners.shape)
-    outside = ((stretched < -0.5) | (stretched > [camera.width - 0.5, camera.height - 0.5])).any(-1)
-    return replace(recording, corners_px=np.where(np.expand_dims(outside, -1), np.nan, stretched))
+    return replace(recording, corners_px=_inside(stretched, camera))
 
 
 def _stretched(grid: Array, pitch: float) -> Array:
@@ -151,8 +150,11 @@ def frozen_robot(recording: Recording, rng: np.random.Generator) -> Recording:
 
 
 def rows_missed(recording: Recording, rng: np.random.Generator) -> Recording:
-    """Two robot poses in the middle were not written: from there on each belongs to the image two rows later."""
-    first = len(recording) // 2 + int(rng.integers(0, 3))
+    """Two robot poses in the middle were not written: from there on each belongs to the image two rows later.
+
+    Two images or more still have their pose among the rows; where none has, nothing shows a shift.
+    """
+    first = len(recording) // 2 - int(rng.integers(0, 3))
     poses = recording.present.base_T_flange
     kept = recording.subset(range(len(recording) - 2))
     return replace(kept, base_T_flange=np.concatenate([poses[:first], poses[first + 2 :]]))
@@ -188,7 +190,13 @@ def images_late(recording: Recording, rng: np.random.Generator) -> Recording:
     corners = project(film.present.camera, points) + rng.normal(
         0.0, NEAR_BOARD.pixel_noise_px, (*points.shape[:2], 2)
     )
-    return replace(film, corners_px=corners)
+    return replace(film, corners_px=_inside(corners, film.present.camera))
+
+
+def _inside(corners: Array, camera: CameraModel) -> Array:
+    """Corners (N, P, 2) px, NaN where they lie outside the picture."""
+    outside = ((corners < -0.5) | (corners > [camera.width - 0.5, camera.height - 0.5])).any(-1)
+    return np.where(np.expand_dims(outside, -1), np.nan, corners)
 
 
 def _rotations_replaced(recording: Recording, rotations: Array) -> Recording:

@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from hecbench.diagnose.case import STANDS_OUT, Examination
 from hecbench.diagnose.finding import Finding, Severity, names
-from hecbench.diagnose.fit import LEAST_SAMPLES, MUCH_BETTER
+from hecbench.diagnose.fit import EXPLAINS, LEAST_SAMPLES, MUCH_BETTER
 from hecbench.diagnose.sequences import shifts, text_orders
 
 ID = "pairing"
 _SHIFTS = (1, -1)
 _LEAST_RUN = 2
-"""Samples that disagree before runs of them are looked for."""
+"""Samples that disagree with a calibration that explains the others, before runs of them are looked for."""
 _FITS = 2 * STANDS_OUT
 _FAR_BETTER = 0.02
 """With the wrong robot pose a planar target may have got its mirrored pose, which then still fits badly."""
@@ -63,7 +63,8 @@ def _in_text_order(case: Examination) -> tuple[Finding, Examination] | None:
 
 def _partly_shifted(case: Examination) -> tuple[Finding, Examination] | None:
     """Images of which some belong to robot poses a few rows off: a row was missed in one stream."""
-    if case.agreed is not None and (~case.agreed[1]).sum() < _LEAST_RUN:
+    explained = case.fit is not None and case.fit.relative < EXPLAINS
+    if explained and case.agreed is not None and (~case.agreed[1]).sum() < _LEAST_RUN:
         return None
     moves = shifts(case)
     if moves is None:

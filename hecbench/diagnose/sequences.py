@@ -8,14 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench.diagnose.case import Examination
-from hecbench.diagnose.fit import EXPLAINS, LEAST_SAMPLES, Fit
+from hecbench.diagnose.fit import EXPLAINS, Fit
 from hecbench.se3 import Array
 
 Indices = NDArray[np.int64]
 
 FARTHEST = 3
 """Samples by which streams are shifted in practice."""
-_WINDOW = 7
+_WINDOWS = (7, 6, 5)
+"""Neighbouring samples that are calibrated alone; fewer where a break leaves no run of more."""
 _SWITCH = 1.5
 """Cost of a change of shift, in limited residuals: it must mend two samples or more."""
 _AGREEING = 0.8
@@ -40,9 +41,14 @@ def shifts(case: Examination) -> Indices | None:
     A calibration of some neighbouring samples says which robot pose each image fits; the runs of equal shifts with the
     least residual are found by dynamic programming (Viterbi 1967).
     """
-    fit = _from_a_window(case)
-    if fit is None:
-        return None
+    for fit in _from_windows(case):
+        path = _path(case, fit)
+        if path is not None:
+            return path
+    return None
+
+
+def _path(case: Examination, fit: Fit) -> Indices | None:
     moves = np.arange(-FARTHEST, FARTHEST + 1)
     limit = EXPLAINS * _motion_px(fit)
     costs = np.stack([_limited(fit, case.base_T_flange, int(move), limit) for move in moves], 1)
@@ -60,19 +66,19 @@ def _motion_px(fit: Fit) -> float:
     return float(np.median(np.linalg.norm(centres - np.median(centres, axis=0), axis=1)))
 
 
-def _from_a_window(case: Examination) -> Fit | None:
-    """The calibration of the neighbouring samples that agree best, applied to all."""
-    count, size = len(case.usable), max(_WINDOW, len(case.usable) // 3)
-    if case.fit is None or count < size or size <= LEAST_SAMPLES:
-        return None
-    found: list[Fit] = []
-    for first in sorted({0, (count - size) // 2, count - size}):
-        part = slice(first, first + size)
-        fit = case.fit_of(case.base_T_flange[part], case.camera_T_target[part])
-        if fit is not None and fit.relative < EXPLAINS:
-            found.append(fit)
-    best = min(found, key=lambda fit: fit.relative, default=None)
-    return None if best is None else Fit(case.fit.problem, best.state, best.focal_px)
+def _from_windows(case: Examination) -> list[Fit]:
+    """Calibrations of neighbouring samples that agree, applied to all; the best first."""
+    if case.fit is None:
+        return []
+    count, found = len(case.usable), []
+    for size in sorted({max(window, count // 3) for window in _WINDOWS if window <= count}):
+        for first in sorted({0, (count - size) // 2, count - size}):
+            part = slice(first, first + size)
+            fit = case.fit_of(case.base_T_flange[part], case.camera_T_target[part])
+            if fit is not None and fit.relative < EXPLAINS:
+                found.append(fit)
+    found.sort(key=lambda fit: fit.relative)
+    return [Fit(case.fit.problem, fit.state, fit.focal_px) for fit in found]
 
 
 def _limited(fit: Fit, base_T_flange: Array, move: int, limit: float) -> Array:
