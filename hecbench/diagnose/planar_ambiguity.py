@@ -6,6 +6,8 @@ pose has its normal mirrored at the line of sight.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from hecbench import se3
@@ -15,6 +17,7 @@ from hecbench.se3 import Array
 
 ID = "planar_ambiguity"
 LEAST_DEG = 8.0
+"""Between two poses of a target seen nearly from the front there may be less; those must contradict the others."""
 FEW = 0.05
 """Share of mirrored poses that robust methods get over."""
 _CLOSER = 0.5
@@ -30,7 +33,8 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
     normals = observed[:, :3, 2]
     mirrored = 2 * (normals * sight).sum(1)[:, None] * sight - normals
     gaps = _angles_deg(normals, predicted[:, :3, 2])
-    flipped = (gaps > LEAST_DEG) & (_angles_deg(mirrored, predicted[:, :3, 2]) < _CLOSER * gaps)
+    suspected = (gaps > LEAST_DEG) | ~case.agreed[1]
+    flipped = suspected & (_angles_deg(mirrored, predicted[:, :3, 2]) < _CLOSER * gaps)
     typical = float(np.rad2deg(np.median(se3.rotation_error_rad(observed, predicted))))
     if not flipped.any():
         summary = f"no target pose is mirrored; their typical rotation error is {typical:.2g} deg"
@@ -45,7 +49,10 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
     )
     many = flipped.mean() > FEW
     severity = Severity.CRITICAL if given and many else Severity.WARNING
-    return Finding(ID, severity, summary, action, float(gaps[flipped].max()), LEAST_DEG, concerned), case
+    finding = Finding(ID, severity, summary, action, float(gaps[flipped].max()), LEAST_DEG, concerned)
+    if given:  # they bend the calibration of the others
+        return finding, replace(case, recording=case.recording.subset(case.usable[~flipped]))
+    return finding, replace(case, explained=case.explained | frozenset(concerned))
 
 
 def _angles_deg(first: Array, second: Array) -> Array:
