@@ -1,6 +1,7 @@
 """Marker methods on generated rigs: accuracy, Cramer-Rao bound, coverage, times, and the recall of `check`.
 
-Run: ``python benchmarks/bench_markers.py accuracy|coverage|times|check|misreadings|good [--rigs 200]``
+Run: ``python benchmarks/bench_markers.py accuracy|coverage|times|check|misreadings|good|good_pictures
+[--rigs 200]``
 (minutes each, one core).
 """
 
@@ -18,6 +19,7 @@ from hecbench_datasets.suites.synthetic_markers import PRESETS, generate, make
 from hecbench_datasets.synthetic_faults import FAULTS, arm_recording
 from hecbench_datasets.synthetic_misreadings import MISREADINGS, near_board
 from hecbench_plugins.markers.reprojection import corner_problem
+from hecbench_plugins.printing.seen import seen
 from hecbench_plugins.solvers.bundle import Bundle
 
 from hecbench import preparation, registry, se3
@@ -184,11 +186,25 @@ GOOD_TARGETS = (
 )
 
 
-def good(rigs):
+def photographed(recording, rng):
+    """The same recording with drawn pictures of its target in place of the corners."""
+    poses = preparation.prepare(recording).camera_T_target
+    size = recording.camera.width, recording.camera.height
+    drawn = [
+        seen(
+            recording.target, recording.camera.K, pose, size, noise=2.0, rng=rng, pixels_per_mm=4.0, samples=3
+        )
+        for pose in poses
+    ]
+    images = tuple(np.repeat(picture[..., None], 3, 2) for picture in drawn)
+    return replace(recording, images=images, corners_px=None, camera_T_target=None)
+
+
+def good(rigs, pictures=False):
     """How often `check` finds something critical, or warns, where nothing is wrong: 8 to 60 samples, both mountings."""
     critical, warned, any_critical = Counter(), Counter(), 0
     for index in range(rigs):
-        rng = np.random.default_rng([17, index])
+        rng = np.random.default_rng([17 + pictures, index])
         setting = replace(
             PRESETS["tag_2m"],
             target=GOOD_TARGETS[index % 3],
@@ -199,16 +215,26 @@ def good(rigs):
             robot_noise_mm=rng.uniform(0.1, 0.8),
             robot_noise_deg=rng.uniform(0.01, 0.08),
         )
-        findings = check(generate(setting, rng))
+        if pictures:
+            small = {"width": 800, "height": 670, "focal_px": 820.0, "pixel_noise_px": 0.02}
+            setting = replace(setting, distance_m=rng.uniform(0.6, 1.2), box_m=0.3, **small)
+            recording = photographed(generate(setting, rng), rng)
+        else:
+            recording = generate(setting, rng)
+        findings = check(recording)
+        if pictures and any(f.severity is Severity.CRITICAL for f in findings):
+            print(index, [(f.id, f.summary) for f in findings if f.severity is Severity.CRITICAL], flush=True)
         critical.update(f.id for f in findings if f.severity is Severity.CRITICAL)
         warned.update(f.id for f in findings if f.severity is Severity.WARNING)
         any_critical += any(f.severity is Severity.CRITICAL for f in findings)
-    print(f"{any_critical} of {rigs} good recordings have a critical finding: {dict(critical)}")
+    what = "with pictures" if pictures else "of corners"
+    print(f"{any_critical} of {rigs} good recordings {what} have a critical finding: {dict(critical)}")
     print(f"warnings: {dict(warned)}", flush=True)
 
 
 CAMPAIGNS = {
     "good": good,
+    "good_pictures": lambda rigs: good(rigs, pictures=True),
     "accuracy": accuracy,
     "coverage": coverage,
     "times": times,

@@ -1,13 +1,11 @@
 """Pictures drawn exactly: every pixel is the mean of the pattern over its square, pixel centres at integers."""
 
-import cv2
 import numpy as np
 import pytest
-from hecbench_plugins.printing.shapes import pattern
+from hecbench_plugins.printing.seen import seen
 
 from hecbench import se3
 from hecbench.recording import CameraModel
-from hecbench.targets import AprilGridTarget, ArucoTarget
 
 SAMPLES_PER_SIDE = 4
 
@@ -95,53 +93,7 @@ def bias(camera):
     return measure
 
 
-PER_MM, SUPERSAMPLES = 12, 6
-
-
-def _origin(target, shown):
-    """Where the target's frame lies in the pattern (mm from the lower left), and the direction of its y."""
-    if isinstance(target, ArucoTarget):
-        return (shown.width / 2, shown.height / 2), 1
-    if isinstance(target, AprilGridTarget):
-        return (shown.quiet, shown.quiet), 1
-    return (0.0, shown.height), -1
-
-
-def _drawn(target, K, camera_T_target, size, *, blur_px=0.6, noise=0.0, rng=None):
-    """(H, W) grey levels; pixel centres at integers."""
-    shown = pattern(target)
-    height, width = (round((side + 2 * shown.quiet) * PER_MM) for side in (shown.height, shown.width))
-    page = np.ones((height, width), np.float32)
-    for r in shown.shapes:
-        left, right = ((x + shown.quiet) * PER_MM for x in (r.x, r.x + r.width))
-        top, low = (height - (y + shown.quiet) * PER_MM for y in (r.y + r.height, r.y))
-        page[round(top) : round(low), round(left) : round(right)] = 0
-    (x, y), up = _origin(target, shown)
-    scale = 1e3 * PER_MM
-    page_from_target = np.array(
-        [
-            [scale, 0, (x + shown.quiet) * PER_MM],
-            [0, -up * scale, height - (y + shown.quiet) * PER_MM],
-            [0, 0, 1],
-        ]
-    )
-    middle = np.array([[1, 0, 0.5], [0, 1, 0.5], [0, 0, 1]])
-    finer = np.array(
-        [[SUPERSAMPLES, 0, (SUPERSAMPLES - 1) / 2], [0, SUPERSAMPLES, (SUPERSAMPLES - 1) / 2], [0, 0, 1]]
-    )
-    image_from_page = finer @ K @ camera_T_target[:3][:, [0, 1, 3]] @ np.linalg.inv(page_from_target) @ middle
-    columns, rows = size
-    fine = cv2.warpPerspective(
-        page, image_from_page, (columns * SUPERSAMPLES, rows * SUPERSAMPLES), borderValue=1.0
-    )
-    grey = fine.reshape(rows, SUPERSAMPLES, columns, SUPERSAMPLES).mean((1, 3))
-    grey = 30 + 200 * cv2.GaussianBlur(grey, (0, 0), blur_px)
-    if rng is not None:
-        grey = grey + rng.normal(0, noise, grey.shape)
-    return np.clip(np.rint(grey), 0, 255).astype(np.uint8)
-
-
 @pytest.fixture(scope="session")
 def drawn():
-    """Pictures of printed targets under a known pose: `_drawn`."""
-    return _drawn
+    """Pictures of printed targets under a known pose."""
+    return seen
