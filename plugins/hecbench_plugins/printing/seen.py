@@ -64,14 +64,14 @@ def _page(target: Target, shown: Pattern, pixels_per_mm: float) -> tuple[NDArray
     for r in shown.shapes:
         if not isinstance(r, Rectangle):
             raise InputError(f"{target.kind}: dots are not drawn as seen; give a target of squares")
-        left, right = ((x + shown.quiet) * pixels_per_mm for x in (r.x, r.x + r.width))
+        near, far = ((x + shown.quiet) * pixels_per_mm for x in (r.x, r.x + r.width))
         top, low = (height - (y + shown.quiet) * pixels_per_mm for y in (r.y + r.height, r.y))
-        page[round(top) : round(low), round(left) : round(right)] = 0
-    (x, y), up = _origin(target, shown)
+        page[round(top) : round(low), round(near) : round(far)] = 0
+    (x, y), right, up = _origin(target, shown)
     scale = 1e3 * pixels_per_mm
     page_from_target = np.array(
         [
-            [scale, 0, (x + shown.quiet) * pixels_per_mm],
+            [right * scale, 0, (x + shown.quiet) * pixels_per_mm],
             [0, -up * scale, height - (y + shown.quiet) * pixels_per_mm],
             [0, 0, 1],
         ]
@@ -79,14 +79,17 @@ def _page(target: Target, shown: Pattern, pixels_per_mm: float) -> tuple[NDArray
     return page, page_from_target
 
 
-def _origin(target: Target, shown: Pattern) -> tuple[tuple[float, float], int]:
-    """Where the target's frame lies in the pattern, mm from the lower left, and 1 where its y points up."""
+def _origin(target: Target, shown: Pattern) -> tuple[tuple[float, float], int, int]:
+    """Where the target's frame lies in the pattern, mm from the lower left; 1 where its x points right, its y up."""
+    centre = shown.width / 2, shown.height / 2
     if isinstance(target, ArucoTarget):
-        return (shown.width / 2, shown.height / 2), 1
+        return centre, 1, 1
     if isinstance(target, AprilTagTarget):
-        return (shown.width / 2, shown.height / 2), -1
+        return centre, 1, -1
     if isinstance(target, AprilGridTarget):
-        return (shown.quiet, shown.quiet), 1
-    if isinstance(target, ChessboardTarget):
-        return (1e3 * target.square_m, shown.height - 1e3 * target.square_m), -1
-    return (0.0, shown.height), -1
+        return (shown.quiet, shown.quiet), 1, 1
+    if isinstance(
+        target, ChessboardTarget
+    ):  # the printed board's first square is its light one, at the lower right
+        return (shown.width - 1e3 * target.square_m, 1e3 * target.square_m), -1, 1
+    return (0.0, shown.height), 1, -1
