@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
-from enum import StrEnum
 from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
@@ -13,57 +11,26 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from hecbench import se3
 from hecbench.errors import InputError, Refusal
-from hecbench.lens import OPENCV, finite
-from hecbench.lens import CameraModel as CameraModel
+from hecbench.lens import CameraModel
+from hecbench.recording.checks import checked_arrays
+from hecbench.recording.digest import digest_of
+from hecbench.recording.present import Present
+from hecbench.recording.terms import Image, ImageSource, Mounting, Need, RobotDescription, hand_poses
 from hecbench.se3 import Array
 from hecbench.system import pictures
 from hecbench.targets import Target
 
-Image = NDArray[np.uint8]
 _Value = TypeVar("_Value", np.uint8, np.bool_, np.float32)
-ImageSource = Path | Image | NDArray[np.uint16] | None
-"""A file that is decoded when asked for, an array in memory, or nothing for this sample."""
-
-_ROTATION_TOLERANCE = 1e-3
-
-
-class Need(StrEnum):
-    """What a recording can offer, and what a solver asks of it."""
-
-    TARGET_POSES = "target_poses"
-    CORNERS = "corners"
-    INTRINSICS = "intrinsics"
-    IMAGES = "images"
-    MASKS = "masks"
-    DEPTH = "depth"
-    JOINTS = "joints"
-    ROBOT_MODEL = "robot_model"
-    INITIAL = "initial"
-
-
-class Mounting(StrEnum):
-    """Where the camera sits: fixed beside the robot, or on its flange."""
-
-    EYE_TO_HAND = "eye_to_hand"
-    EYE_IN_HAND = "eye_in_hand"
-
-
-@dataclass(frozen=True, kw_only=True)
-class RobotDescription:
-    """The arm by name or URDF file, and the two links between which `base_T_flange` is given."""
-
-    model: str | None = None
-    urdf: Path | None = None
-    base_link: str = "base"
-    flange_link: str = "tool0"
-    joint_names: tuple[str, ...] = ()
-
-    @property
-    def source(self) -> str | Path | None:
-        """What `load_robot` takes: the URDF where there is one, or the name; None when neither is known."""
-        return self.urdf or self.model
+_PER_SAMPLE_PICTURES = ("images", "masks", "depths")
+_PER_SAMPLE_ARRAYS = (
+    "base_T_flange",
+    "joints_rad",
+    "camera_T_target",
+    "corners_px",
+    "robot_stamp_s",
+    "camera_stamp_s",
+)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -116,69 +83,11 @@ class Recording:
             raise InputError("samples: there are none; a recording needs at least one")
         if len(set(self.sample_ids)) != len(self.sample_ids):
             raise InputError("samples: two have the same id; make the ids unique")
-        for name in ("initial_parent_T_camera", "truth_parent_T_camera"):
-            if (pose := getattr(self, name)) is not None:
-                self._put(name, _rigid(finite(name, pose, (4, 4))[None], name)[0])
-        for name in ("base_T_flange", "camera_T_target"):
-            if (poses := self._per_sample(name, (4, 4))) is not None:
-                self._put(name, _rigid(poses, f"samples[{{}}].{name}"))
-        joint_count = np.shape(self.joints_rad)[-1] if self.joints_rad is not None else 0
-        self._put("joints_rad", self._per_sample("joints_rad", (joint_count,)))
-        if self.robot and self.robot.joint_names and self.joints_rad is not None:
-            declared = len(self.robot.joint_names)
-            if joint_count != declared:
-                raise InputError(
-                    f"samples[0].joints_rad: {joint_count} numbers for {declared} robot.joint_names"
-                )
-        for name in ("robot_stamp_s", "camera_stamp_s"):
-            self._put(name, self._per_sample(name, ()))
-        self._check_corners()
+        for name, value in checked_arrays(self).items():
+            object.__setattr__(self, name, value)
         for name in _PER_SAMPLE_PICTURES:
             if (sources := getattr(self, name)) is not None and len(sources) != len(self):
                 raise InputError(f"{name}: {len(sources)} for {len(self)} samples")
-        self._check_every_sample_has_a_robot_pose()
-
-    def _per_sample(self, name: str, shape: tuple[int, ...]) -> Array | None:
-        """The array of that name with N rows; rows are finite or wholly NaN, all-NaN arrays None."""
-        if (value := getattr(self, name)) is None:
-            return None
-        array = np.asarray(value, float)
-        if array.shape != (len(self), *shape):
-            raise InputError(
-                f"{name}: shape {array.shape}, expected {(len(self), *shape)}, one row per sample"
-            )
-        finite = np.isfinite(array.reshape(len(self), -1))
-        for i in np.flatnonzero(finite.any(1) & ~finite.all(1)):
-            raise InputError(
-                f"samples[{i}].{name}: holds a number that is not finite; correct or leave it out"
-            )
-        return array if finite.any() else None
-
-    def _put(self, name: str, value: Array | None) -> None:
-        object.__setattr__(self, name, value)
-
-    def _check_corners(self) -> None:
-        if self.corners_px is None:
-            return
-        if self.target is None:
-            raise InputError("samples[0].corners_px: given without a target; describe the target")
-        corners = np.asarray(self.corners_px, float)
-        expected = (len(self), len(self.target.points_m), 2)
-        if corners.shape != expected:
-            raise InputError(
-                f"corners_px: shape {corners.shape}, expected {expected}: one row per target point"
-            )
-        if np.isinf(corners).any() or (np.isnan(corners[..., 0]) != np.isnan(corners[..., 1])).any():
-            raise InputError("corners_px: holds a number that is not finite; use null for a point not seen")
-        self._put("corners_px", corners if np.isfinite(corners).any() else None)
-
-    def _check_every_sample_has_a_robot_pose(self) -> None:
-        known = np.zeros(len(self), bool)
-        for array in (self.base_T_flange, self.joints_rad):
-            if array is not None:
-                known |= np.isfinite(array.reshape(len(self), -1)).all(1)
-        for i in np.flatnonzero(~known):
-            raise InputError(f"samples[{i}]: has neither base_T_flange nor joints_rad; give at least one")
 
     def __len__(self) -> int:
         return len(self.sample_ids)
@@ -285,91 +194,9 @@ class Recording:
     @cached_property
     def sha256(self) -> str:
         """Digest of the content: every array and description, and the bytes of the image files that exist."""
-        digest = hashlib.sha256()
-        for item in fields(self):
-            value = getattr(self, item.name)
-            if item.name not in ("folder", "notes") and value is not None:
-                digest.update(item.name.encode())
-                _update(digest, value)
-        return digest.hexdigest()
-
-
-class Present:
-    """The fields of a recording as values that are never None; one that is absent raises a `Refusal` with its name."""
-
-    robot: RobotDescription
-    camera: CameraModel
-    target: Target
-    initial_parent_T_camera: Array
-    truth_parent_T_camera: Array
-    base_T_flange: Array
-    joints_rad: Array
-    camera_T_target: Array
-    corners_px: Array
-    images: tuple[ImageSource, ...]
-    masks: tuple[ImageSource, ...]
-    depths: tuple[ImageSource, ...]
-    folder: Path
-
-    def __init__(self, recording: Recording) -> None:
-        self._recording = recording
-
-    def __getattr__(self, name: str) -> Any:
-        if name not in Present.__annotations__:
-            raise AttributeError(name)
-        if (value := getattr(self._recording, name)) is None:
-            raise Refusal(f"recording '{self._recording.name}' has no {name}")
-        return value
-
-
-_PER_SAMPLE_PICTURES = ("images", "masks", "depths")
-_PER_SAMPLE_ARRAYS = (
-    "base_T_flange",
-    "joints_rad",
-    "camera_T_target",
-    "corners_px",
-    "robot_stamp_s",
-    "camera_stamp_s",
-)
-
-
-def hand_poses(mounting: Mounting, base_T_flange: Array) -> Array:
-    """H (..., 4, 4) m of `Recording.hand_poses` for flange poses (..., 4, 4), and back."""
-    return base_T_flange if mounting is Mounting.EYE_TO_HAND else se3.inverse(base_T_flange)
-
-
-def _rigid(poses: Array, name: str) -> Array:
-    """Check transforms (N, 4, 4), NaN rows allowed, and move rounded rotations onto SO(3).
-
-    `name` is for errors; its {} stands for the sample's index.
-    """
-    given = ~np.isnan(poses).all((1, 2))
-    for i in np.flatnonzero(given & ~se3.is_transform(poses, _ROTATION_TOLERANCE)):
-        raise InputError(
-            f"{name.format(i)}: is not a rigid transform; write a row-major 4x4 with an orthonormal, "
-            "right-handed rotation, metres, and the last row 0 0 0 1"
-        )
-    rounded = given & ~se3.is_transform(poses, 1e-9)
-    if rounded.any():
-        poses = poses.copy()
-        poses[rounded, :3, :3] = se3.nearest_rotation(poses[rounded, :3, :3])
-    return poses
-
-
-def _update(digest: Any, value: Any) -> None:
-    if isinstance(value, np.ndarray):
-        digest.update(str(value.shape).encode() + np.ascontiguousarray(value).tobytes())
-    elif isinstance(value, Path):
-        digest.update(value.read_bytes() if value.is_file() else value.name.encode())
-    elif isinstance(value, tuple):
-        for part in value:
-            _update(digest, part)
-    elif hasattr(value, "__dataclass_fields__"):
-        for item in fields(value):
-            part = getattr(value, item.name)
-            if (
-                item.name != "distortion_model" or part != OPENCV
-            ):  # 0.1 had no such field: digests stay the same
-                _update(digest, part)
-    else:
-        digest.update(repr(value).encode())
+        given = {
+            item.name: getattr(self, item.name)
+            for item in fields(self)
+            if item.name not in ("folder", "notes")
+        }
+        return digest_of({name: value for name, value in given.items() if value is not None})
