@@ -26,11 +26,13 @@ _file = click.Path(path_type=Path, dir_okay=False)
 @click.option("--host", default="127.0.0.2", show_default=True, help="A loopback address; one per arm.")
 @click.option("--model", default="ur5e", show_default=True, help="ur3e, ur5e or ur10e.")
 @click.option("--time-scale", type=float, default=1.0, show_default=True, help="Its seconds per real second.")
-def controller(host: str, model: str, time_scale: float) -> None:
+@click.option("--software", default="5.11.6.0", show_default=True, help="The version that it claims to be.")
+def controller(host: str, model: str, time_scale: float, software: str) -> None:
     """Run a simulated UR controller until it is interrupted; prints `ready HOST` when it listens."""
-    from hecbench_hardware.controller_sim.server import serve
+    from hecbench_hardware.controller_sim.server import serve, version_of
 
-    serve(host, model=model, time_scale=time_scale, announce=click.echo)
+    version = version_of(software)
+    serve(host, model=model, time_scale=time_scale, version=version, announce=click.echo)
 
 
 @click.command()

@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+import socket
 import subprocess
 import sys
 
@@ -11,6 +12,7 @@ import pytest
 from click.testing import CliRunner
 from hecbench_hardware.commands import controller as controller_verb
 from hecbench_hardware.commands import record
+from hecbench_hardware.controller_sim.server import version_of
 from hecbench_hardware.kinematics import ARMS
 from PIL import Image
 
@@ -140,12 +142,31 @@ def test_controller_prints_ready_and_ends_when_asked():
             "from hecbench_hardware.commands import controller; controller()",
             "--host",
             "127.0.2.9",
+            "--software",
+            "3.15.8.0",
         ],
         stdout=subprocess.PIPE,
         text=True,
     )
     assert process.stdout.readline() == "ready 127.0.2.9\n"
+    with socket.create_connection(("127.0.2.9", 29999), 5) as dashboard, dashboard.makefile("rw") as lines:
+        lines.readline()
+        lines.write("PolyscopeVersion\n")
+        lines.flush()
+        assert "URSoftware 3.15.8." in lines.readline()
     os.kill(process.pid, signal.SIGINT)
     assert process.wait(5) == 0
     process.stdout.close()
     assert CliRunner().invoke(controller_verb, ["--help"]).exit_code == 0
+
+
+@pytest.mark.parametrize("text", ["", "5", "5.x", "-5.11", "5.11.6.0.1", "256.1", "5.256", "5.11.123456"])
+def test_a_claimed_software_that_is_no_version_is_refused(text):
+    result = CliRunner().invoke(controller_verb, ["--software", text])
+    assert isinstance(result.exception, InputError)
+    assert "5.11.6.0" in str(result.exception)
+
+
+def test_what_a_claimed_software_leaves_out_is_zero():
+    assert version_of("3.15.8.0") == (3, 15, 8, 0)
+    assert version_of("5.26") == (5, 26, 0, 0)

@@ -3,12 +3,11 @@
 import sys
 
 from hecbench.errors import HecbenchError
-from hecbench_hardware.controller_sim.server import serve
+from hecbench_hardware.controller_sim.server import serve, version_of
 
 
 def main(host: str, model: str, time_scale: str, version: str) -> None:
     """Serve until told to stop; one line on stdout: ready, or what is wrong."""
-    major, minor, bugfix, build = (int(part) for part in version.split("."))
 
     def announce(line: str) -> None:
         sys.stdout.write(f"{line}\n")
@@ -19,7 +18,7 @@ def main(host: str, model: str, time_scale: str, version: str) -> None:
             host,
             model=model,
             time_scale=float(time_scale),
-            version=(major, minor, bugfix, build),
+            version=version_of(version),
             announce=announce,
             lifeline=sys.stdin.buffer,
         )

@@ -225,6 +225,19 @@ class _Server:
                     self.send(connection, data)
 
 
+def version_of(text: str) -> tuple[int, int, int, int]:
+    """The software version that a text like 5.11.6.0 names; what is left out is 0.
+
+    Raises:
+        InputError: it is none that the messages on the ports can carry.
+    """
+    parts = text.split(".") if re.fullmatch(r"[0-9]{1,5}(\.[0-9]{1,5}){1,3}", text) else ["256"]
+    major, minor, bugfix, build = (*map(int, parts), 0, 0, 0)[:4]
+    if max(major, minor) > 255:
+        raise InputError(f"'{text}' is no software version: give it like 5.11.6.0")
+    return major, minor, bugfix, build
+
+
 def serve(
     host: str,
     *,
