@@ -15,6 +15,10 @@ Grey = NDArray[np.uint8]
 
 _WINDOW_PX = (2, 10)
 _LEAST_CONTRAST = 1.2
+_INTO_SQUARE = (0.2, 0.3, 0.4)
+"""How far from a corner towards the next ones a square is looked at."""
+_LEAST_CROSSING = 0.2
+"""Of the difference between the squares around a corner: how much lighter the darker light one is than any dark one."""
 _LEAST_HEIGHT_PX = 360
 """Of the shorter side of the shrunk picture that is searched first; one four times as large takes six times as long."""
 
@@ -40,7 +44,7 @@ def corners(grey: Grey, columns: int, rows: int) -> Array | None:
         points = cv2.cornerSubPix(grey, points, (window, window), (-1, -1), criteria)
         grid = unmirrored(np.asarray(points, float).reshape(rows, columns, 2))
         lightness = _first_square_lightness(grey, grid)
-        if is_regular(grid) and abs(lightness) > _LEAST_CONTRAST:
+        if is_regular(grid) and abs(lightness) > _LEAST_CONTRAST and _are_crossings(grey, grid):
             return (grid[::-1, ::-1] if (columns + rows) % 2 and lightness < 0 else grid).reshape(-1, 2)
     return None
 
@@ -51,12 +55,38 @@ def _window(grid: Array) -> int:
     return int(np.clip(min(sides) / 2, *_WINDOW_PX))
 
 
+def _are_crossings(grey: Grey, grid: Array) -> bool:
+    """Whether two dark and two light squares meet in every corner; at the outline there is one dark one at most.
+
+    A grid of which a row lies outside the picture may otherwise be found one row too far the other way.
+    """
+    across, down = np.gradient(grid, axis=1), np.gradient(grid, axis=0)
+    squares = np.array(
+        [
+            np.mean(
+                [_grey_at(grey, grid + share * (x * across + y * down)) for share in _INTO_SQUARE], axis=0
+            )
+            for x, y in ((1, 1), (-1, -1), (1, -1), (-1, 1))
+        ]
+    )
+    first = np.where(np.indices(grid.shape[:2]).sum(0) % 2 == 0, 1.0, -1.0)
+    sign = first * np.sign(np.median(first * (squares[:2].sum(0) - squares[2:].sum(0))))
+    light, dark = np.where(sign > 0, squares[:2], squares[2:]), np.where(sign > 0, squares[2:], squares[:2])
+    spread = np.maximum(squares.max(0) - squares.min(0), 1.0)
+    return bool(((light.min(0) - dark.max(0)) / spread > _LEAST_CROSSING).all())
+
+
+def _grey_at(grey: Grey, points: Array) -> Array:
+    """Grey levels at points (..., 2) px; those at the border for points outside."""
+    x, y = np.rint(points).astype(int).transpose(2, 0, 1)
+    return np.asarray(grey[np.clip(y, 0, grey.shape[0] - 1), np.clip(x, 0, grey.shape[1] - 1)], float)
+
+
 def _first_square_lightness(grey: Grey, grid: Array) -> float:
     """How much lighter the squares of the first one's colour are than the others, in standard deviations of
     all: 2 on a chessboard with the first one light, -2 with it dark, about 0 on anything else."""
     centres = (grid[:-1, :-1] + grid[1:, :-1] + grid[:-1, 1:] + grid[1:, 1:]) / 4
-    x, y = np.rint(centres).astype(int).transpose(2, 0, 1)
-    brightness = grey[np.clip(y, 0, grey.shape[0] - 1), np.clip(x, 0, grey.shape[1] - 1)].astype(float)
+    brightness = _grey_at(grey, centres)
     row, column = np.indices(brightness.shape)
     same = (row + column) % 2 == 0
     if same.all():

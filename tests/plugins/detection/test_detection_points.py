@@ -7,7 +7,9 @@ from hecbench_plugins.detection import chessboard as chessboards
 from hecbench_plugins.detection import circles as circle_grids
 from hecbench_plugins.detection.pictures import Greys
 
+from hecbench import se3
 from hecbench.errors import InputError, TargetNotSeen
+from hecbench.lens import project
 from hecbench.storage import recording_io
 from hecbench.targets import ANY_TAG, AprilTagTarget, CharucoTarget, ChessboardTarget
 
@@ -29,6 +31,19 @@ def test_the_first_square_of_an_odd_board_is_light(draw, chessboard, views):
     upright = chessboards.corners(draw(pattern, 1000, (40, 40), pose), 8, 5)
     turned = chessboards.corners(draw(pattern[::-1, ::-1], 1000, (40, 40), pose), 8, 5)
     assert np.linalg.norm(upright[0] - turned[-1]) < 0.5
+
+
+def test_a_board_that_is_cut_off_is_not_found_a_row_too_far(drawn, camera):
+    target = ChessboardTarget(7, 5, 0.03)
+    for cut in range(12):
+        pose = se3.from_rotvec([0.05, 0.1, 0.15], [0.02 + 0.012 * cut, -0.05, 0.6])
+        grey = drawn(target, camera.K, pose, (camera.width, camera.height))
+        found = chessboards.corners(grey, 7, 5)
+        if found is None:
+            continue
+        expected = project(camera, se3.transform_points(pose, target.points_m))
+        apart = min(np.linalg.norm(found - order, axis=1).max() for order in (expected, expected[::-1]))
+        assert apart < 1.0, cut
 
 
 @pytest.mark.parametrize("marked", [True, False])
