@@ -21,6 +21,8 @@ Picture = NDArray[np.float32]
 LEVELS = (4, 2, 1)
 """Pixels of the recording per pixel of a level, coarse to fine."""
 _COARSE_CELL_M = {16: 0.02, 8: 0.01, 4: 0.004, 2: 0.0015, 1: 0.0}
+_LEAST_PX = 32
+"""Of a picture's side: eight pixels at the coarsest of the levels."""
 _LEAST_MASK, _MOST_MASK = 1e-3, 0.95
 _BACKGROUND_SPREAD = 0.08
 _SMALLEST_HIDING_PX, _SOFT_EDGE_PX = 9, 2
@@ -92,13 +94,18 @@ def photographed_robot(recording: Recording) -> PosedRobot:
     """The robot that the photographs of a recording show.
 
     Raises:
-        Refusal: no intrinsics or joints.
+        Refusal: no intrinsics or joints, or pictures of a few rows or columns.
         InputError: there is no robot model, or its description is faulty.
     """
     if recording.camera is None or recording.camera.K is None:
         raise Refusal("the camera's intrinsics are unknown")
     if recording.joints_rad is None:
         raise Refusal("no sample has joints_rad")
+    width, height = recording.camera.width, recording.camera.height
+    if min(width, height) < _LEAST_PX:
+        raise Refusal(
+            f"pictures of {width}x{height} px are too small to find the robot in: {_LEAST_PX} px or more each way"
+        )
     return PosedRobot.of(recording)
 
 

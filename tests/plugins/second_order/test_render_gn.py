@@ -182,3 +182,12 @@ def test_a_furnished_scene_is_not_taken_for_hiding():
     assert hidden_by_others(image, np.zeros(3, np.float32), mask)[40, 110]
     image[80:] = 0.5
     assert hidden_by_others(image, np.zeros(3, np.float32), mask) is None
+
+
+@pytest.mark.parametrize(("width", "height"), [(1000, 3), (3, 1000), (31, 31)])
+def test_pictures_of_a_few_rows_are_refused(easy, width, height):
+    recording = replace(
+        easy, camera=replace(easy.camera, width=width, height=height), images=None, masks=None
+    )
+    with pytest.raises(Refusal, match=f"{width}x{height} px are too small"):
+        prepare(recording)
