@@ -91,6 +91,7 @@ def insertion(**options: Any) -> None:
 
 def _trial(task_name: str, given: dict[str, Any]) -> None:
     from hecbench import __version__
+    from hecbench.running.solving import versions
     from hecbench_hardware.lab.trial_cell import LabCell
     from hecbench_hardware.trials import runner
     from hecbench_hardware.trials.opening import open_cell
@@ -100,7 +101,11 @@ def _trial(task_name: str, given: dict[str, Any]) -> None:
     options = TrialOptions(**given)
     if options.dynamics and task_name != "grasp":
         raise InputError("--dynamics is for grasps: insertions are judged by contact alone")
-    command = {"hecbench": __version__, "command": shlex.join(["hecbench", *sys.argv[1:]])}
+    origin = {
+        "hecbench": __version__,
+        "versions": versions(),
+        "command": shlex.join(["hecbench", *sys.argv[1:]]),
+    }
     with ExitStack() as open_devices:
         opened = open_cell(options, open_devices)
         for note in opened.notes:
@@ -111,7 +116,7 @@ def _trial(task_name: str, given: dict[str, Any]) -> None:
             clearance_m=options.clearance_mm / 1e3,
             most=options.trials,
             seed=options.seed,
-            provenance=command | options.provenance,
+            provenance=origin | options.provenance,
         )
         contents = runner.run(
             plan,

@@ -27,6 +27,7 @@ from hecbench.system import files
 from hecbench.verdict import Verdict
 
 FILE_NAME = "report.html"
+_OF_TRIALS = ("robot", "station", "size", "supersample", "noise", "dynamics")
 
 
 @dataclass(frozen=True)
@@ -106,13 +107,7 @@ def page(
         methods=len({trial.method for trial in trials}),
         recordings=len({e.provenance.get("recording_sha256") for e in estimates}),
         solvers={e.solver for e in estimates},
-        provenance=[
-            ("hecbench", _values(estimates, "hecbench") or [__version__]),
-            ("libraries", _values(estimates, "versions")),
-            ("seeds", _values(estimates, "seed")),
-            ("solvers", sorted({e.solver for e in estimates})),
-            ("trials", sorted({trial.method for trial in trials})),
-        ],
+        provenance=_provenance(estimates, trials),
     )
 
 
@@ -134,7 +129,23 @@ def _section(group: Group, evidence: Callable[[str], Evidence | None], has_dots:
     )
 
 
-def _values(estimates: Sequence[Estimate], name: str) -> list[str]:
+def _provenance(
+    estimates: Sequence[Estimate], trials: Sequence[TrialRecord]
+) -> list[tuple[str, Sequence[str]]]:
+    """What the page says of where it comes from: names and their different values."""
+    every: list[Estimate | TrialRecord] = [*estimates, *trials]
+    seeds = {*_values(estimates, "seed"), *(str(trial.seed) for trial in trials)}
+    return [
+        ("hecbench", _values(every, "hecbench") or [__version__]),
+        ("libraries", _values(every, "versions")),
+        ("seeds", sorted(seeds, key=lambda seed: (len(seed), seed))),
+        ("solvers", sorted({e.solver for e in estimates})),
+        ("trials of", sorted({trial.method for trial in trials})),
+        *((f"{name} of the trials", _values(trials, name)) for name in _OF_TRIALS),
+    ]
+
+
+def _values(origins: Sequence[Estimate | TrialRecord], name: str) -> list[str]:
     """The different values of one entry of the provenance, as text."""
 
     def text(value: Any) -> str:
@@ -144,4 +155,4 @@ def _values(estimates: Sequence[Estimate], name: str) -> list[str]:
             else str(value)
         )
 
-    return sorted({text(e.provenance[name]) for e in estimates if e.provenance.get(name) not in (None, "")})
+    return sorted({text(e.provenance[name]) for e in origins if e.provenance.get(name) not in (None, "")})

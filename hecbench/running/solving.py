@@ -103,7 +103,7 @@ def provenance(recording: Recording, options: Options) -> dict[str, Any]:
         "seed": options.seed,
         "masks": options.segmenter,
         "command": options.command,
-        "versions": _versions(),
+        "versions": versions(),
     } | {
         name: pose.tolist()
         for name in ("initial_parent_T_camera", "truth_parent_T_camera")
@@ -247,7 +247,8 @@ def _measured(
 
 
 @cache
-def _versions() -> dict[str, str]:
+def versions() -> dict[str, str]:
+    """Of Python and of the libraries on which numbers depend."""
     python = f"{sys.version_info.major}.{sys.version_info.minor}.{sys.version_info.micro}"
     names = ("numpy", "scipy", "numba", "opencv-contrib-python-headless")
     return {"python": python} | {name: metadata.version(name) for name in names}

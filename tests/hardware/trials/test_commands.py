@@ -145,4 +145,12 @@ def test_report_of_trials_alone_counts_them(tmp_path):
     assert CliRunner().invoke(cli, ["report", str(tmp_path)]).output.strip().endswith("report.html: 2 trials")
     printed = json.loads(CliRunner().invoke(cli, ["report", str(tmp_path), "--json"]).stdout)
     assert (printed["results"], printed["trials"], printed["damage"]) == (0, 2, [])
-    assert "2 trials of 1 calibration method." in html.write(tmp_path).path.read_text()
+    text = html.write(tmp_path).path.read_text()
+    assert "2 trials of 1 calibration method." in text
+    for words in (
+        "<dt>libraries</dt><dd>",
+        "numpy ",
+        "<dt>seeds</dt><dd>0</dd>",
+        "<dt>robot of the trials</dt><dd>lab",
+    ):
+        assert words in text
