@@ -44,7 +44,7 @@ class Termination(StrEnum):
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """An answer. A solver fills the first block; the runner adds where it came from and what the rulers say.
+    """An answer. A solver fills the first block; the runner adds where it came from and what the evaluators say.
 
     Attributes:
         parent_T_camera: (4, 4) m; parent = base (eye_to_hand) or flange (eye_in_hand). None unless ok.

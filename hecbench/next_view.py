@@ -134,7 +134,9 @@ def information_of(estimate: Estimate) -> Array:
         InputError: it has no answer, or no covariance.
     """
     if estimate.parent_T_camera is None or estimate.covariance is None:
-        raise InputError(f"{estimate.solver}: has no covariance, so that what it knows cannot be told")
+        raise InputError(
+            f"{estimate.solver}: has no covariance, so that what is known of the camera cannot be computed"
+        )
     return np.asarray(np.linalg.inv(se3.inverse_covariance(estimate.parent_T_camera, estimate.covariance)))
 
 
@@ -163,7 +165,7 @@ def expected_error_m(known: Array, parent_T_camera: Array, points_m: Array) -> f
 def possible_cameras(
     known: Array, parent_T_camera: Array, look: ViewInformation, count: int, rng: np.random.Generator
 ) -> Array:
-    """Cameras (count, 4, 4) drawn from what is known about one, spread so that they can be told apart in a mask.
+    """Cameras (count, 4, 4) drawn from what is known about one, spread so that a mask can distinguish them.
 
     A second-order solver knows the camera better than a mask can show: the spread is scaled, its shape kept, until the
     contour of a look moves by `SPREAD_PX` typically.

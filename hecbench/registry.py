@@ -75,8 +75,8 @@ class Plugin:
         if self.spec is None:
             return ""
         options = self.spec.options if isinstance(self.spec, ConfigurableSpec) else ()
-        told = "".join(f"; [{option.name}=...]: {option.summary}" for option in options)
-        return self.spec.summary + told
+        offered = "".join(f"; [{option.name}=...]: {option.summary}" for option in options)
+        return self.spec.summary + offered
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Where the gripper works, as points at which calibrations are compared: one definition for every ruler."""
+"""Where the gripper works, as points at which calibrations are compared: one definition for every evaluator."""
 
 from __future__ import annotations
 

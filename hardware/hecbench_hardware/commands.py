@@ -59,7 +59,7 @@ def controller(host: str, model: str, time_scale: float, software: str) -> None:
     "--plan",
     "criterion",
     type=click.Choice(["diverse", "d_optimal", "mask_variance"]),
-    help="How --poses chooses: diverse poses of the target, or views in which the robot tells most about the camera. "
+    help="How --poses chooses: diverse poses of the target, or views in which the robot shows most about the camera. "
     "Default: diverse, or d_optimal for a cell without a target.",
 )
 @click.option(
@@ -99,9 +99,7 @@ def record(
     CELL describes camera, target and mounting. Its samples are the plan, or with --poses the first one is the
     start of a planned one, or with --freedrive they are not used. The checked plan is written to OUT/plan.json.
     """
-    from hecbench.running.starts import start_of
     from hecbench.specs import Kind
-    from hecbench.storage import recording_io
     from hecbench_hardware.arming import Operator, take_control
     from hecbench_hardware.devices import FollowsRobot, KnowsTruth
     from hecbench_hardware.recorder.record import Recorder
@@ -110,19 +108,15 @@ def record(
         raise InputError("--freedrive has no plan: leave --poses and --dry-run out")
     if criterion is not None and poses is None:
         raise InputError(f"--plan {criterion}: say how many with --poses")
-    plan = recording_io.load(cell)
-    if init is not None:
-        plan = replace(plan, initial_parent_T_camera=start_of(init, plan))
+    plan = _described(cell, init)
     given = device_settings(settings)
-    extra = {"host": host, "limits": None if limits is None else str(limits)}
+    extra = {key: str(value) for key, value in (("host", host), ("limits", limits)) if value is not None}
     with ExitStack() as open_devices:
         eye = None
         if camera != "none" and not dry_run:
             eye = open_device(Kind.CAMERA, camera, given["camera"])
             open_devices.callback(eye.close)
-        device = open_device(
-            Kind.ROBOT, robot, given["robot"] | {k: v for k, v in extra.items() if v is not None}
-        )
+        device = open_device(Kind.ROBOT, robot, given["robot"] | extra)
         open_devices.callback(device.close)
         if isinstance(eye, FollowsRobot):
             eye.follow(device)
@@ -135,18 +129,27 @@ def record(
         operator = Operator(device, yes)
         take_control(device, what, armed=arm, confirm=operator.confirm)
         recorder = Recorder(
-            device,
-            eye,
-            plan,
-            out,
-            frames=frames,
-            acknowledge=operator.acknowledge,
-            report=lambda line: click.echo(line, err=True),
+            device, eye, plan, out, frames=frames, acknowledge=operator.acknowledge, report=_say
         )
         recording = recorder.follow_hand(_more) if freedrive else recorder.drive()
         if isinstance(eye, KnowsTruth):
             recording = eye.with_truth(recording)
     _print(recording, out, as_json)
+
+
+def _say(line: str) -> None:
+    click.echo(line, err=True)
+
+
+def _described(cell: Path, init: str | None) -> Recording:
+    """The recording that describes the cell, with the camera's rough place where it is given."""
+    from hecbench.running.starts import start_of
+    from hecbench.storage import recording_io
+
+    described = recording_io.load(cell)
+    if init is None:
+        return described
+    return replace(described, initial_parent_T_camera=start_of(init, described))
 
 
 def _checked(

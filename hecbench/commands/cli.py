@@ -81,7 +81,7 @@ def _interrupt(number: int, frame: object) -> None:
 @click.group(cls=_Verbs, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
 @click.version_option(__version__, prog_name="hecbench")
 def cli() -> None:
-    """Calibrate hand-eye rigs with every method, measure all by the same rulers, and report."""
+    """Calibrate hand-eye rigs with every method, measure all of them alike, and report."""
 
 
 for _verb in (calibrate, demo, robot, run, solve, view):

@@ -120,9 +120,8 @@ def pose_conventions(
                 wrong_way = inverted is None and inverse != assumed_inverted
                 text = f"{a}_T_{b} {name} in {length}{order}"
                 poses_m = se3.inverse(scaled) if inverse else scaled
-                found.append(
-                    PoseConvention(poses_m, text, unusual + wrong_way + rare + bool(order), bool(order))
-                )
+                deviations = unusual + wrong_way + rare + bool(order)
+                found.append(PoseConvention(poses_m, text, deviations, unusual=bool(order)))
     if not found:
         raise InputError(faults[0])
     return found

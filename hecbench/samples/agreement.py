@@ -1,4 +1,4 @@
-"""The one limit above which an answer contradicts the samples it was made from, for solvers, `check` and rulers.
+"""The one limit above which an answer contradicts the samples it was made from, for solvers, `check` and evaluators.
 
 What counts is where the target is seen: a target pose says much about that, and little about depth and tilt. Data
 without a common calibration leave the typical target as far from its prediction as it moved.

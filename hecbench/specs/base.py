@@ -79,5 +79,7 @@ class ConfigurableSpec(Spec):
                 ) from error
         if not values:
             return self
-        told = ",".join(f"{name}={settings[name]}" for name in sorted(settings))
-        return replace(self, name=f"{self.name}[{told}]", factory=partial(self.factory, **values), options=())
+        given = ",".join(f"{name}={settings[name]}" for name in sorted(settings))
+        return replace(
+            self, name=f"{self.name}[{given}]", factory=partial(self.factory, **values), options=()
+        )

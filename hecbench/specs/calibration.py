@@ -34,7 +34,7 @@ class SolverSpec(ConfigurableSpec):
     needs: frozenset[Need]
     reference: str
     slow: bool = False
-    """Folds of the held-out ruler run only when asked for (renderer methods)."""
+    """Folds of the held-out evaluator run only when asked for (renderer methods)."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class Evaluator(Protocol):
-    """A ruler. `solve` calibrates another recording with the same method, for rulers that refit on folds."""
+    """An evaluator. `solve` calibrates another recording with the same method, for evaluators that refit on folds."""
 
     def __call__(
         self,
@@ -30,7 +30,7 @@ class Evaluator(Protocol):
 
 
 class ResultSection(StrEnum):
-    """Where a ruler's numbers go, and when it is applied."""
+    """Where an evaluator's numbers go, and when it is applied."""
 
     ERRORS = "errors"
     """It reads the truth, and is applied where there is one."""

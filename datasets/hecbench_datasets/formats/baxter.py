@@ -3,7 +3,7 @@
 Lu, Richter and Yip 2020, "Robust keypoint detection and pose estimation of robot manipulators with self-occlusions via
 sim-to-real transfer". ``ground_truth_data`` is a pickle of ``pose_N -> joints, ee_2d px, ee_3d m`` in the camera's
 frame, ``pose_N/*.png`` the pictures. The camera stands still, so the arm's kinematics laid onto the labelled 3D points
-tell where: that is the truth, as good as the note says. The labelled pixel is a keypoint, see docs/rulers.md.
+tell where: that is the truth, as good as the note says. The labelled pixel is a keypoint, see docs/evaluators.md.
 """
 
 from __future__ import annotations

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from hecbench.recording import Recording
     from hecbench.verdict import Verdict
     from hecbench_hardware.cockpit.choosing import Devices
+    from hecbench_hardware.cockpit.page import Page
     from hecbench_hardware.cockpit.session import Session
     from hecbench_hardware.devices import Camera, Robot
 
@@ -114,10 +115,15 @@ def cockpit(
             session = use(suggested)
         page = Page(server, session, tolerance_mm, partial(finish, tolerance_mm))
         opened.callback(page.close)
-        while True:
-            began = time.monotonic()
-            page.tick()
-            time.sleep(max(_REST_S, _TICK_S - (time.monotonic() - began)))
+        _keep_up(page)
+
+
+def _keep_up(page: Page) -> None:
+    """Look again and again, until it is interrupted."""
+    while True:
+        began = time.monotonic()
+        page.tick()
+        time.sleep(max(_REST_S, _TICK_S - (time.monotonic() - began)))
 
 
 def _open(opened: ExitStack, chosen: Devices, given: dict[str, dict[str, str]]) -> tuple[Robot, Camera]:

@@ -1,1 +1,1 @@
-"""Rulers, one metric family per file."""
+"""Evaluators, one metric family per file."""

@@ -104,7 +104,7 @@ def _aligned(pattern: Array, points: Array) -> Array:
 
 @hookimpl
 def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
-    """This file's ruler."""
+    """This file's evaluator."""
     yield EvaluatorSpec(
         name="consistency",
         summary="spread of the target's pose; reconstruction of the target's points",

@@ -1,4 +1,4 @@
-"""How well the photographs confirm the robot's contour: the ruler for recordings with neither a target nor masks."""
+"""How well the photographs confirm the robot's contour: for recordings with neither a target nor masks."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def _applies(recording: Recording) -> bool:
 
 @hookimpl
 def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
-    """This file's ruler."""
+    """This file's evaluator."""
     yield EvaluatorSpec(
         name="contour_held_out",
         summary="the robot's contour in left-out photographs, where there is neither a target nor a mask",

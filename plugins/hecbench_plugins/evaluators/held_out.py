@@ -1,4 +1,4 @@
-"""How well a calibration predicts samples it has not seen: the ruler for recordings without truth."""
+"""How well a calibration predicts samples it has not seen: the evaluator for recordings without truth."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def held_out(
 ) -> Mapping[str, Any]:
     """Prediction of left-out samples, 5-fold by robot pose: rms with its bootstrap interval, median, each sample's.
 
-    X is the solver's on the training folds. The ruler itself refits Y = carrier_T_target there with the raw
+    X is the solver's on the training folds. The evaluator itself refits Y = carrier_T_target there with the raw
     robot poses, identically for every solver, and predicts ``inverse(X) @ H @ Y`` for the left-out samples. A
     fold on which the solver gives no answer is counted in `failed_folds` and predicts nothing. A solver that changes
     the intrinsics is judged with its own camera: pixels are predicted by it, and what it saw is computed again by it.
@@ -122,7 +122,7 @@ def _residuals(parent_T_camera: Array, carrier_T_target: Array, recording: Recor
 
 @hookimpl
 def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
-    """This file's ruler."""
+    """This file's evaluator."""
     yield EvaluatorSpec(
         name="held_out",
         summary="prediction of left-out samples",

@@ -135,7 +135,7 @@ def distances_to_truth_mm(estimate: Estimate, recording: Recording, points: Arra
 
 @hookimpl
 def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
-    """This file's rulers."""
+    """This file's evaluators."""
     yield EvaluatorSpec(
         name="pck",
         summary="keypoints of the robot predicted in the picture (PCK)",

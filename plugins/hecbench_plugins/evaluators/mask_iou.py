@@ -97,7 +97,7 @@ def _drawable(recording: Recording) -> bool:
 
 @hookimpl
 def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
-    """This file's rulers."""
+    """This file's evaluators."""
     yield EvaluatorSpec(
         name="mask_iou",
         summary="overlap of the robot drawn at the answer with the masks",

@@ -72,7 +72,7 @@ def pair_error_m(estimate: Estimate, recording: Recording, points_m: Array) -> f
 
 @hookimpl
 def hecbench_evaluators() -> Iterable[EvaluatorSpec]:
-    """This file's ruler."""
+    """This file's evaluator."""
     yield EvaluatorSpec(
         name="errors",
         summary="errors against the true camera pose",

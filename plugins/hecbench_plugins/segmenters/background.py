@@ -54,7 +54,7 @@ def by_background(recording: Recording) -> Recording:
     scene, _ = background(images)
     unlike = foreground(images, scene)
     note = (
-        f"masks: from the background of {len(samples)} views; what the robot covers in most of them cannot be told"
+        f"masks: from the background of {len(samples)} views; what the robot covers in most of them stays unknown"
         " from background"
     )
     if {Need.INITIAL, Need.ROBOT_MODEL, Need.JOINTS, Need.INTRINSICS} <= recording.offers():
@@ -64,7 +64,7 @@ def by_background(recording: Recording) -> Recording:
         found = [_cleaned(mask) for mask in unlike > _FOREGROUND]
     if not any(mask.any() for mask in found):
         raise Refusal(
-            f"{recording.name}: nothing moves between the images: no background can be told from the robot"
+            f"{recording.name}: nothing moves between the images: the background cannot be separated from the robot"
         )
     masks: list[NDArray[np.uint8] | None] = [None] * len(recording)
     for i, mask in zip(samples, found, strict=True):

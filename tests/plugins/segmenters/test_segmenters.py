@@ -78,7 +78,7 @@ def test_background_finds_what_moves_and_the_start_tells_what_stands(before_a_wa
     found = [iou(started.mask(i), mask) for i, mask in enumerate(masks)]
     assert min(found) > 0.9
     assert np.mean(moving) < np.mean(found)
-    assert "cannot be told" in without_start.notes[-1]
+    assert "stays unknown" in without_start.notes[-1]
     assert "drawn at the start" in started.notes[-1]
 
 
