@@ -87,6 +87,24 @@ def test_matrices_below_each_other(tmp_path, pair):
     check(tmp_path, pair)
 
 
+def test_matrices_as_numpy_prints_them(tmp_path, pair):
+    with np.printoptions(precision=9, suppress=True):
+        for name, poses in zip(("robot", "target"), pair, strict=True):
+            (tmp_path / f"{name}.txt").write_text("\n".join(map(str, poses)))
+            assert "[[" in (tmp_path / f"{name}.txt").read_text()
+    check(tmp_path, pair)
+
+
+@pytest.mark.parametrize("cells", [["nan"] * 6, [""] * 6])
+def test_a_row_without_a_pose_is_named(tmp_path, pair, cells):
+    lines = text(rows(pair[1])).splitlines()
+    lines[4] = ",".join(cells)
+    (tmp_path / "robot.csv").write_text(text(rows(pair[0])))
+    (tmp_path / "target.csv").write_text("\n".join(lines))
+    with pytest.raises(InputError, match=r"row 5 holds no pose.*delete it, and the row that belongs to it"):
+        load_recording(tmp_path)
+
+
 def test_one_file_with_hand_and_eye_rows(tmp_path, pair):
     lines = [
         f"{word},{','.join(f'{v:.9f}' for v in row)}"

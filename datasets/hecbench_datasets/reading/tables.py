@@ -21,7 +21,10 @@ from hecbench_datasets.reading.sources import IMAGE_SUFFIXES, YAML_SUFFIXES, jso
 TABLE_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".xlsx", ".json", *YAML_SUFFIXES, ".npy", ".npz")
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
 _LIST = re.compile(r"\s*(?:p|array)?[\[(]+(.*?)[\])]+\s*", re.DOTALL)
+_BARE_LIST = re.compile(r"[\[\]()\d\s.,;eE+-]*[\[\]][\[\]()\d\s.,;eE+-]*")
+_NOTHING = frozenset({"", "nan", "none", "null", "n/a", "-"})
 _MOST_COLUMNS = 10_000
+_POSE_NUMBERS = 6
 _MOST_UNPACKED = 100 << 20
 
 
@@ -78,6 +81,8 @@ def read_table(path: Path) -> Table:
 def _lines(content: str) -> list[list[str]]:
     """Cells of the lines, a header in a comment included; decimal commas become points."""
     lines = [line.strip() for line in content.splitlines()]
+    if not any("," in line or ";" in line for line in lines):  # a matrix as NumPy prints it
+        lines = [re.sub(r"[\[\]]", " ", x).strip() if _BARE_LIST.fullmatch(x) else x for x in lines]
     data = [line for line in lines if line and not line.startswith(("#", "//", "%"))]
     if not data:
         return []
@@ -177,6 +182,11 @@ def _from_rows(rows: list[list[str]], source: str) -> Table:
     for number, row in enumerate(body, 1 + titled):
         if len(row) != width:
             raise InputError(f"{source}: row {number}: {len(row)} cells after rows of {width}; complete it")
+        if sum(cell.lower() in _NOTHING for cell in row) >= max(_POSE_NUMBERS, width - 2):
+            raise InputError(
+                f"{source}: row {number} holds no pose ({row[-1] or 'empty cells'}); delete it, and the row that "
+                "belongs to it in the other table"
+            )
     if titled and len(names) != width:
         names = _stretched(names, width)
     return Table(source, tuple(names), tuple(_column([row[i] for row in body]) for i in range(width)))
