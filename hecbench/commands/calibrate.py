@@ -100,7 +100,8 @@ def calibrate_into(
         estimates = calibrating.solved(examined, specs, options, progress.start, progress.done)
         progress.writing()
         found = calibrating.judged(examined, specs, estimates, tolerance_mm, at_m)
-        calibrating.Calibration(found, examined.evidence()).save(out)
+        for line in calibrating.Calibration(found, examined.evidence()).save(out):
+            console.say(line)
         if found.recommended is not None:
             pictures.write(examined.segmented.recording, found.recommended, out)
         return found, html.write(out).path

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from hecbench import diagnose, preparation, registry, verdict
 from hecbench.diagnose import Finding
+from hecbench.errors import HecbenchError
 from hecbench.estimate import Estimate
 from hecbench.recording import Recording
 from hecbench.running.solving import Options, each_solved, provenance
@@ -33,14 +34,18 @@ class Calibration:
     verdict: Verdict
     evidence: Evidence
 
-    def save(self, folder: Path) -> None:
-        """``verdict.json``, ``<solver>.json`` of each method, the exports of the recommended one, and the evidence."""
+    def save(self, folder: Path) -> list[str]:
+        """``verdict.json``, ``<solver>.json`` of each method, the exports of the recommended one, and the evidence.
+
+        Returns what `export_all` says.
+        """
         self.verdict.save(folder / VERDICT_NAME)
         for estimate in self.verdict.estimates:
             estimate.save(folder / f"{estimate.solver}.json")
         evidence.save(self.evidence, folder)
-        if self.verdict.recommended is not None:
-            export_all(self.verdict.recommended, folder / EXPORTS)
+        if self.verdict.recommended is None:
+            return []
+        return export_all(self.verdict.recommended, folder / EXPORTS)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +120,15 @@ def evidence_from(recording: Recording, prepared: Recording, findings: Sequence[
     return evidence.collect(prepared, recording.sha256, [f.to_json() for f in findings], influence_mm)
 
 
-def export_all(estimate: Estimate, folder: Path) -> None:
-    """The estimate by every exporter, one file each."""
+def export_all(estimate: Estimate, folder: Path) -> list[str]:
+    """The estimate by every exporter, one file each; returns a line for each that cannot write it, or is faulty."""
+    left_out = []
     for exporter in registry.load().ready(Kind.EXPORTER, ExporterSpec):
-        files.write_text(folder / f"{exporter.name}{exporter.suffix}", exporter.write(estimate, {}))
+        try:
+            content = exporter.write(estimate, {})
+        except Exception as error:
+            reason = str(error) if isinstance(error, HecbenchError) else f"{type(error).__name__}: {error}"
+            left_out.append(f"{folder.name}/{exporter.name}{exporter.suffix} is not written: {reason}")
+            continue
+        files.write_text(folder / f"{exporter.name}{exporter.suffix}", content)
+    return left_out

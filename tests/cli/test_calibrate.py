@@ -103,3 +103,18 @@ def test_an_unreadable_image_costs_its_sample_only(hecbench, tmp_path):
     assert "left out" in done.stderr
     assert "img05.jpg" in done.stderr
     assert "img12.jpg" in done.stderr
+
+
+def test_an_exporter_that_cannot_costs_its_own_file(hecbench, tmp_path):
+    poses_alone = replace(
+        conformance.rig(np.random.default_rng(1), Mounting.EYE_TO_HAND, noise=1e-4),
+        camera=None,
+        target=None,
+        corners_px=None,
+    )
+    recording_io.save(poses_alone, tmp_path / "cell")
+    done = hecbench("calibrate", tmp_path / "cell", "--out", tmp_path / "out", "--solver", "shah")
+    assert "report: " in done.stderr, done.stderr
+    assert "camera_info.yaml is not written: estimate of 'shah': holds no camera with K" in done.stderr
+    assert (tmp_path / "out" / "report.html").exists()
+    assert (tmp_path / "out" / "exports" / "json.json").exists()
