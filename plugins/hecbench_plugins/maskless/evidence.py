@@ -17,7 +17,7 @@ _DOUBTFUL = 0.5
 """Of the median share of confirmed contour: a photograph with less disagrees with the others."""
 
 
-def covariance(camera_T_parent: Array, last: ContourEquations, prior: Array) -> Array:
+def covariance(camera_T_parent: Array, last: ContourEquations, prior: Array, shared: Array) -> Array:
     """(6, 6) of parent_T_camera's left perturbation, the joints being off by constants that nobody knows.
 
     Contour points are correlated along the contour and share what is wrong with their photograph, so the information
@@ -30,6 +30,7 @@ def covariance(camera_T_parent: Array, last: ContourEquations, prior: Array) -> 
         camera_T_parent: (4, 4).
         last: the comparison there, with columns for the joints.
         prior: (6 + J,) information about the camera, none, and the joints' offsets.
+        shared: (6, 6) of camera_T_parent's left perturbation by what all photographs get wrong alike.
     """
     scores = [
         gradient @ np.linalg.solve(information + 1e-9 * np.trace(information) * np.eye(6), gradient)
@@ -39,7 +40,7 @@ def covariance(camera_T_parent: Array, last: ContourEquations, prior: Array) -> 
     freedom = 6.0 * (len(scores) - 1)
     factor = (_PRIOR_FREEDOM * CORRELATED_POINTS + sum(scores)) / (_PRIOR_FREEDOM + freedom)
     seen_from_camera = np.linalg.inv(last.A / factor + np.diag(prior))[:6, :6]
-    return se3.inverse_covariance(camera_T_parent, seen_from_camera)
+    return se3.inverse_covariance(camera_T_parent, seen_from_camera + shared)
 
 
 def to_estimate(

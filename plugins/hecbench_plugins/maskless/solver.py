@@ -34,6 +34,7 @@ from hecbench_plugins.start_search.by_photographs import starts
 from hecbench_plugins.start_search.view_sphere import ViewSphere
 from hecbench_plugins.views import scene_background
 from hecbench_plugins.views.canvas import Canvas, undistorted_canvas
+from hecbench_plugins.views.common_error import common_error
 from hecbench_plugins.views.pyramid import mesh_at, meshes_by_level, photographed_robot
 
 NEAR, FAR = Ball(0.1, np.deg2rad(10)), Ball(0.2, np.deg2rad(20))
@@ -229,9 +230,10 @@ class Maskless:
             end, extras, judged = solved.refined, solved.extras, solved.refined.last
         else:
             judged = compare(lines, end.camera_T_parent, robot, nominal, last, left_out_m)
+        shared = common_error(end.camera_T_parent, canvas.parent_T_link, float(canvas.K[0, 0]))
         return evidence.to_estimate(
             end,
-            evidence.covariance(end.camera_T_parent, judged, prior_information(len(nominal))),
+            evidence.covariance(end.camera_T_parent, judged, prior_information(len(nominal)), shared),
             canvas.sample_ids,
             path,
             photographs.renders + lines.renders,

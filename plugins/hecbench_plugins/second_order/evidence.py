@@ -15,6 +15,7 @@ from hecbench.se3 import Array
 from hecbench_plugins.second_order.descent import Descent, Trace, draw_counted
 from hecbench_plugins.second_order.photometry import Photometry
 from hecbench_plugins.second_order.silhouette import contour_rows, distances_at, outer
+from hecbench_plugins.views.common_error import Middle, common_error
 from hecbench_plugins.views.pyramid import View
 
 _BLIND = 1e-12
@@ -70,8 +71,9 @@ def to_estimate(
     """The estimate with its evidence: covariance, observability, and the test of the other side.
 
     The covariance is the inverse Fisher information of the last comparison, Huber off, with the noise of its own
-    residuals (Hartley and Zisserman 2004, section 5.2); correlated residuals count as fewer, and the errors of the
-    estimated colours are carried on, and so is what stages that explain the same evidence disagree about.
+    residuals (Hartley and Zisserman 2004, section 5.2); correlated residuals count as fewer. The errors of the
+    estimated colours are carried on, and so is what stages that explain the same evidence disagree about, and the
+    error that all pictures share.
     """
     camera_T_parent = end.descent.pose
     end.photometry.huber = np.inf
@@ -93,8 +95,9 @@ def to_estimate(
     parent_T_camera = se3.inverse(camera_T_parent)
     covariance = None
     if seen_from_camera is not None:
-        carried = se3.adjoint(parent_T_camera)
-        covariance = carried @ (seen_from_camera + seen_from_camera.T) @ carried.T / 2
+        focal_px = float(np.asarray(views[0].levels[1].renderer.K)[0, 0])
+        shared = common_error(camera_T_parent, [view.parent_T_link for view in views], focal_px)
+        covariance = se3.inverse_covariance(camera_T_parent, seen_from_camera + shared)
     diagnostics["weakest_direction"] = [round(float(part), 3) for part in directions[:, 0]]
     parent_T_root = views[0].parent_T_link[0]
     other_side = parent_T_root @ _HALF_TURN @ se3.inverse(parent_T_root)
@@ -131,8 +134,6 @@ def _scaled(information: Array, camera_T_parent: Array, views: Sequence[View]) -
 
     A twist [phi, rho] about that point, rotation times half the robot's size: both parts are lengths then.
     """
-    points = np.concatenate([(camera_T_parent @ view.parent_T_link)[:, :3, 3] for view in views])
-    middle, size = points.mean(0), max(float(np.ptp(points, axis=0).max()) / 2, 0.1)
-    about = se3.adjoint(se3.make(np.eye(3), middle)) @ np.diag([1 / size] * 3 + [1.0] * 3)
+    about = Middle.of(camera_T_parent, [view.parent_T_link for view in views]).lengths()
     values, directions = np.linalg.eigh(about.T @ information @ about)
     return np.maximum(values, 1e-300), directions
