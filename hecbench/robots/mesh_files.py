@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import re
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -114,7 +115,9 @@ def _other(
     suffix = path.suffix.lower().lstrip(".")
     if resolver is None and suffix == "gltf":
         resolver = trimesh.resolvers.FilePathResolver(str(path))
-    scene = trimesh.load_scene(io.BytesIO(content), file_type=suffix, process=False, resolver=resolver)
+    with np.errstate(all="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of numbers that `piece` refuses in words
+        scene = trimesh.load_scene(io.BytesIO(content), file_type=suffix, process=False, resolver=resolver)
     pieces = []
     for node in scene.graph.nodes_geometry:
         transform, name = scene.graph[node]
