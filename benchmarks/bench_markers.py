@@ -200,10 +200,13 @@ def photographed(recording, rng):
     return replace(recording, images=images, corners_px=None, camera_T_target=None)
 
 
-def good(rigs, pictures=False):
-    """How often `check` finds something critical, or warns, where nothing is wrong: 8 to 60 samples, both mountings."""
+def good(rigs, pictures=False, first=0):
+    """How often `check` finds something critical, or warns, where nothing is wrong: 8 to 60 samples, both mountings.
+
+    Of the recordings from number `first` on, so that a long campaign can be made in parts.
+    """
     critical, warned, any_critical = Counter(), Counter(), 0
-    for index in range(rigs):
+    for index in range(first, first + rigs):
         rng = np.random.default_rng([17 + pictures, index])
         setting = replace(
             PRESETS["tag_2m"],
@@ -233,8 +236,6 @@ def good(rigs, pictures=False):
 
 
 CAMPAIGNS = {
-    "good": good,
-    "good_pictures": lambda rigs: good(rigs, pictures=True),
     "accuracy": accuracy,
     "coverage": coverage,
     "times": times,
@@ -244,7 +245,13 @@ CAMPAIGNS = {
 
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("campaign", choices=CAMPAIGNS)
+    parser.add_argument("campaign", choices=(*CAMPAIGNS, "good", "good_pictures"))
     parser.add_argument("--rigs", type=int, default=200)
+    parser.add_argument(
+        "--first", type=int, default=0, help="of good and good_pictures: the first recording's number"
+    )
     arguments = parser.parse_args()
-    CAMPAIGNS[arguments.campaign](arguments.rigs)
+    if arguments.campaign in CAMPAIGNS:
+        CAMPAIGNS[arguments.campaign](arguments.rigs)
+    else:
+        good(arguments.rigs, arguments.campaign == "good_pictures", arguments.first)
