@@ -43,7 +43,7 @@ def photographed(family: str, folder: Path) -> Path:
     images, base_T_flange = [], []
     for _ in range(SAMPLES):
         turn, shift = rng.uniform(-0.6, 0.6, 3), rng.uniform(-0.06, 0.06, 3)
-        camera_T_target = se3.make(se3.so3_exp(turn), [0, 0, 0.4] + shift)
+        camera_T_target = se3.make(se3.so3_exp(turn), shift + np.array([0, 0, 0.4]))
         base_T_flange.append(base_T_camera @ camera_T_target @ se3.make(np.eye(3), [0, 0, -0.05]))
         try:
             images.append(seen(target, camera.intrinsics, camera_T_target, (camera.width, camera.height)))
