@@ -47,10 +47,10 @@ class Uncertainty:
             points_m: where the error counts.
             unexplained_m: what independent evidence shows beyond the covariance, rms.
         """
-        from scipy.stats import f as f_distribution
+        from scipy.special import fdtri
 
         tail = (1 - CONFIDENCE) / 2
-        ends = f_distribution.ppf([tail, 1 - tail], self.directions(points_m), self.freedom)
+        ends = fdtri(self.directions(points_m), self.freedom, [tail, 1 - tail])
         value = np.hypot(self.rms_m(points_m), unexplained_m)
         low, high = np.sqrt(ends) * value
         return Expected(1e3 * float(value), 1e3 * float(low), 1e3 * float(high))
@@ -64,7 +64,7 @@ def uncertainty(estimate: Estimate, samples: int, points_m: Array) -> Uncertaint
         samples: that the method could use.
         points_m: (P, 3) where the scatter is compared.
     """
-    from scipy.stats import f as f_distribution
+    from scipy.special import fdtri
 
     scatter = _of_folds(estimate)
     freedom = max(
@@ -78,7 +78,7 @@ def uncertainty(estimate: Estimate, samples: int, points_m: Array) -> Uncertaint
     if scatter is None:
         return own
     ratio = (scatter.rms_m(points_m) / max(own.rms_m(points_m), 1e-12)) ** 2
-    by_chance = f_distribution.ppf(CONFIDENCE, scatter.freedom * own.directions(points_m), freedom)
+    by_chance = fdtri(scatter.freedom * own.directions(points_m), freedom, CONFIDENCE)
     return Uncertainty(own.covariance * max(1.0, ratio / by_chance), freedom)
 
 
