@@ -1,5 +1,6 @@
 """The process of `SimulatedController`, with arguments HOST MODEL TIME_SCALE VERSION."""
 
+import os
 import sys
 
 from hecbench.errors import HecbenchError
@@ -25,6 +26,8 @@ def main(host: str, model: str, time_scale: str, version: str) -> None:
     except HecbenchError as error:
         announce(str(error))
         sys.exit(error.exit_code)
+    except BrokenPipeError:
+        os._exit(1)  # nobody is left to serve or to tell; a normal exit would write to stdout once more
 
 
 main(*sys.argv[1:])

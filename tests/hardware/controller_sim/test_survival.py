@@ -182,3 +182,22 @@ def test_no_file_descriptor_left():
     finally:
         own.terminate()
         assert own.wait(20.0) == 0
+
+
+def test_a_parent_that_died_at_once_gets_no_traceback():
+    reading, writing = os.pipe()
+    os.close(reading)
+    command = [
+        sys.executable,
+        "-m",
+        "hecbench_hardware.controller_sim",
+        "127.0.0.61",
+        "ur5e",
+        "1",
+        "5.11.0.0",
+    ]
+    process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=writing, stderr=subprocess.PIPE)
+    os.close(writing)
+    _, errors = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert errors == b""
