@@ -14,8 +14,8 @@ from hecbench.rendering.smooth import Normals
 def normal_map(renderer: Renderer, known: Normals) -> Float:
     """Unit normals (H, W, 3), camera frame, of the last pose that was rasterised; 0 where no face is seen."""
     out = np.zeros((*renderer.face.shape, 3), np.float32)
-    surface = renderer._screen, renderer.mesh.faces, renderer.face, renderer._face_link
-    _interpolate(*surface, known.vectors, known.faces, renderer._camera_T_link, renderer.box, out)
+    surface = renderer.sight.screen, renderer.mesh.faces, renderer.face, renderer.edges.face_link
+    _interpolate(*surface, known.vectors, known.faces, renderer.sight.camera_T_link, renderer.box, out)
     return out
 
 

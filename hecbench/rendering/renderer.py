@@ -8,53 +8,47 @@ derivative agree and only a few thousand pixels matter.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hecbench.errors import InputError
-from hecbench.rendering import kernels, shading
+from hecbench.rendering import crossing_kernels, kernels, shading
+from hecbench.rendering.crossings import CrossingBuffers, Crossings, Edges
 from hecbench.rendering.mesh import Float, Int, RenderMesh
 from hecbench.rendering.smooth import Normals, normals
 
 
-@dataclass(frozen=True, eq=False)
-class Crossings:
-    """C places where a visible edge crosses the segment between two neighbouring pixel centres p and q, at t.
+class Scene(NamedTuple):
+    """What the rasteriser draws: a mesh, see `RenderMesh`, and the camera."""
 
-    Attributes:
-        pixels: (C, 2) flat indices of p and q; q is right of p or below it.
-        parts: (C, 2) of p and q, -1 for the background.
-        link: (C,) that the edge belongs to, and moves with.
-        t: (C,) in [0, 1], px from p.
-        point: (C, 3) m on the edge, camera frame.
-        gradient: (C, 3) px/m: dt by the motion of the point in the camera frame.
-        slope: (C,) of the edge, columns per row for horizontal pairs, rows per column for vertical ones.
-        mix: (C, 4): share of q's colour in p, its derivative by -t; share of p's colour in q, its derivative by t.
-    """
+    vertices: Float
+    vertex_start: Int
+    planes: Float
+    face_start: Int
+    faces: Int
+    K: Float
+    """fx, skew, cx, fy, cy with pixel centres at +0.5."""
 
-    pixels: Int
-    parts: Int
-    link: Int
-    t: Float
-    point: Float
-    gradient: Float
-    slope: Float
-    mix: Float
 
-    def __len__(self) -> int:
-        return len(self.link)
+class Sight(NamedTuple):
+    """What the rasteriser writes."""
 
-    @property
-    def horizontal(self) -> NDArray[np.bool_]:
-        """Which pairs (C,) are horizontal."""
-        return np.asarray(self.pixels[:, 1] - self.pixels[:, 0] == 1)
-
-    def pose_columns(self) -> NDArray[np.float64]:
-        """dt (C, 6) px by a left perturbation [phi rad, rho m] of camera_T_robot."""
-        gradient = self.gradient.astype(float)
-        return np.concatenate([np.cross(self.point.astype(float), gradient), gradient], 1)
+    camera_T_link: Float
+    """(L, 3, 4)"""
+    screen: Float
+    """(3, V): u, v, and 1/z, which is 0 where a vertex is nearer than the near plane."""
+    front: NDArray[np.bool_]
+    """(F,) which faces face the camera."""
+    order: Int
+    """Scratch."""
+    nearness: Float
+    """(H, W) 1/m, 0 where nothing is."""
+    face: Int
+    """(H, W), -1 where nothing is."""
+    box: Int
+    """x0, x1, y0, y1 (inclusive) of the pixels that were covered."""
 
 
 @dataclass(eq=False)
@@ -75,10 +69,15 @@ class Renderer:
     width: int
     height: int
     ambient: float | None = None
+    scene: Scene = field(init=False)
+    sight: Sight = field(init=False)
+    edges: Edges = field(init=False)
+    nearness: Float = field(init=False)
+    face: Int = field(init=False)
     box: Int = field(init=False)
-    """x0, x1, y0, y1 (inclusive) of the pixels that the robot covered in the last `draw`."""
+    """The last three are those of `sight`."""
     painted: Int = field(init=False)
-    """The same of the pixels that the last `image` touched; all others show the background."""
+    """x0, x1, y0, y1 (inclusive) of the pixels that the last `image` touched; all others show the background."""
     dropped: int = field(default=0, init=False)
     """Front faces of the last pose that reach behind the near plane (0.05 m) and were not drawn."""
 
@@ -91,67 +90,39 @@ class Renderer:
         if self.ambient is not None and not 0 <= self.ambient <= 1:
             raise InputError(f"ambient is a share of the light between 0 and 1, is {self.ambient}")
         mesh, shape = self.mesh, (self.height, self.width)
-        capacity = max(4096, self.width * self.height // 4)
-        self._intrinsics = np.array([K[0, 0], K[0, 1], K[0, 2] + 0.5, K[1, 1], K[1, 2] + 0.5], np.float32)
-        self._face_link = mesh.part_link[mesh.face_part]
-        self._screen = np.zeros((3, mesh.vertices.shape[1]), np.float32)
-        self._front = np.zeros(len(mesh.faces), np.bool_)
-        self._order = np.zeros(2 * len(mesh.edge_ends) + len(mesh.faces) + 1, np.int32)
-        self.box = np.array([0, self.width - 1, 0, self.height - 1], np.int32)
-        self.painted = self.box.copy()
-        self._background = np.full(4, np.nan, np.float32)
-        self._best = np.zeros((2, *shape), np.int32)
-        self._taken = np.zeros(2 * self.width * self.height, np.float32)
-        self._pair = np.zeros(capacity, np.int32)
-        self._place = np.zeros((capacity, 2), np.float32)
-        self._edge = np.zeros(capacity, np.int32)
-        self._ends = np.zeros((capacity, 4), np.int32)
-        self._link = np.zeros(capacity, np.int32)
-        self._point = np.zeros((capacity, 3), np.float32)
-        self._gradient = np.zeros((capacity, 3), np.float32)
-        self._slope = np.zeros(capacity, np.float32)
-        self._mix = np.zeros((capacity, 4), np.float32)
-        self._count = 0
-        self._image = np.zeros((*shape, 4), np.float32)
-        self._camera_T_link = np.zeros((len(mesh.vertex_start) - 1, 3, 4), np.float32)
-        self._normals: Normals | None = None if self.ambient is None else normals(mesh)
-        self._shade = np.ones(shape, np.float32)
-        self._slide = np.zeros((*shape, 3) if self._normals else (0, 0, 3), np.float32)
-        self._derivative: Float | None = None
-        self._derived = self.box.copy()
-        self.nearness = np.zeros(shape, np.float32)
-        self.face = np.full(shape, -1, np.int32)
-
-    @property
-    def scene(self) -> tuple[Float | Int, ...]:
-        """What `kernels.see` draws: the mesh and the camera."""
-        mesh = self.mesh
-        return (
+        self.scene = Scene(
             mesh.vertices,
             mesh.vertex_start,
             mesh.planes,
             mesh.face_start,
             mesh.faces,
-            self._intrinsics,
+            np.array([K[0, 0], K[0, 1], K[0, 2] + 0.5, K[1, 1], K[1, 2] + 0.5], np.float32),
         )
-
-    @property
-    def sight(self) -> tuple[NDArray[Any], ...]:
-        """What `kernels.see` writes to; the last three are `nearness`, `face` and `box`."""
-        return (
-            self._camera_T_link,
-            self._screen,
-            self._front,
-            self._order,
-            self.nearness,
-            self.face,
-            self.box,
+        self.sight = Sight(
+            camera_T_link=np.zeros((len(mesh.vertex_start) - 1, 3, 4), np.float32),
+            screen=np.zeros((3, mesh.vertices.shape[1]), np.float32),
+            front=np.zeros(len(mesh.faces), np.bool_),
+            order=np.zeros(2 * len(mesh.edge_ends) + len(mesh.faces) + 1, np.int32),
+            nearness=np.zeros(shape, np.float32),
+            face=np.full(shape, -1, np.int32),
+            box=np.array([0, self.width - 1, 0, self.height - 1], np.int32),
         )
+        self.nearness, self.face, self.box = self.sight[4:]
+        self.edges, self._found = Edges.of(mesh), CrossingBuffers.of(self.width, self.height)
+        self._count = 0
+        self.painted = self.box.copy()
+        self._background = np.full(4, np.nan, np.float32)
+        self._image = np.zeros((*shape, 4), np.float32)
+        self._normals: Normals | None = None if self.ambient is None else normals(mesh)
+        self._shade = np.ones(shape, np.float32)
+        self._slide = np.zeros((*shape, 3) if self._normals else (0, 0, 3), np.float32)
+        self._derivative: Float | None = None
+        self._derived = self.box.copy()
 
     def scale_focal(self, factor: float) -> None:
         """From now on draw with both focal lengths (and the skew) `factor` times those of K."""
         K = np.asarray(self.K, float)
-        self._intrinsics[[0, 1, 3]] = factor * np.array([K[0, 0], K[0, 1], K[1, 1]])
+        self.scene.K[[0, 1, 3]] = factor * np.array([K[0, 0], K[0, 1], K[1, 1]])
 
     def rasterise(self, camera_T_link: ArrayLike) -> None:
         """Only the part of `draw` that finds what each pixel centre sees: `face`, `nearness`, `depth`, `part`, `link`.
@@ -167,21 +138,9 @@ class Renderer:
             raise InputError(
                 f"expected {len(self.mesh.vertex_start) - 1} finite link poses, got shape {poses.shape}"
             )
-        mesh = self.mesh
-        self._camera_T_link[:] = poses[:, :3]
-        kernels.project(
-            mesh.vertices,
-            mesh.vertex_start,
-            mesh.planes,
-            mesh.face_start,
-            self._camera_T_link,
-            self._intrinsics,
-            self._screen,
-            self._front,
-        )
-        self.dropped = kernels.rasterise(
-            self._screen, mesh.faces, self._front, self._order, self.nearness, self.face, self.box
-        )
+        self.sight.camera_T_link[:] = poses[:, :3]
+        kernels.project(self.scene, self.sight)
+        self.dropped = kernels.rasterise(self.scene, self.sight)
 
     def draw(self, camera_T_link: ArrayLike) -> int:
         """Rasterise the robot with its links at camera_T_link (L, 4, 4); returns the number of crossings.
@@ -189,43 +148,9 @@ class Renderer:
         Afterwards `image`, `crossings`, `depth`, `part` and `link` belong to this pose.
         """
         self.rasterise(camera_T_link)
-        mesh = self.mesh
-        self._count = kernels.find_crossings(
-            self._screen,
-            mesh.edge_ends,
-            mesh.edge_faces,
-            mesh.edge_kinds,
-            self._front,
-            self._order,
-            self.face,
-            mesh.face_part,
-            self._face_link,
-            self.nearness,
-            self.box,
-            self._best,
-            self._pair,
-            self._place,
-            self._edge,
-        )
-        self._count = kernels.describe_crossings(
-            self._screen,
-            mesh.edge_ends,
-            mesh.edge_faces,
-            self.face,
-            mesh.face_part,
-            self._face_link,
-            self._intrinsics,
-            self._pair,
-            self._place,
-            self._edge,
-            self._count,
-            self._taken,
-            self._ends,
-            self._link,
-            self._point,
-            self._gradient,
-            self._slope,
-            self._mix,
+        count = crossing_kernels.find_crossings(self.edges, self.sight, self._found)
+        self._count = crossing_kernels.describe_crossings(
+            self.edges, self.sight, self.scene.K, count, self._found
         )
         return self._count
 
@@ -236,12 +161,12 @@ class Renderer:
             self._image[:] = table[-1]
             self._background = table[-1].copy()
         face, face_part = self.face, self.mesh.face_part
-        edges = self._ends, self._mix, self._count, self.box, self.painted
+        edges = self._found.ends, self._found.mix, self._count, self.box, self.painted
         if self._normals is None:
-            kernels.compose(face, face_part, table, *edges, self._image)
+            crossing_kernels.compose(face, face_part, table, *edges, self._image)
         else:
             self._light(self._normals)
-            shading.compose(face, face_part, table, self._shade, self._best, *edges, self._image)
+            shading.compose(face, face_part, table, self._shade, self._found.best, *edges, self._image)
         return self._image
 
     def image_derivative(self, colours: ArrayLike | None = None, background: ArrayLike = (0, 0, 0)) -> Float:
@@ -262,15 +187,17 @@ class Renderer:
                 self.face,
                 self.mesh.face_part,
                 self.nearness,
-                self._intrinsics,
+                self.scene.K,
                 self.box,
-                self._best,
+                self._found.best,
                 table,
                 self._shade,
                 self._slide,
                 self._derivative,
             )
-        shading.edge_rates(table, self._shade, self._ends, self._mix, columns, self._count, self._derivative)
+        shading.edge_rates(
+            table, self._shade, self._found.ends, self._found.mix, columns, self._count, self._derivative
+        )
         return self._derivative
 
     def _table(self, colours: ArrayLike | None, background: ArrayLike) -> Float:
@@ -283,10 +210,17 @@ class Renderer:
 
     def _light(self, known: Normals) -> None:
         shading.shade_pixels(
-            (self._screen, self.mesh.faces, self.face, self._face_link, known.vectors, known.faces),
+            (
+                self.sight.screen,
+                self.mesh.faces,
+                self.face,
+                self.edges.face_link,
+                known.vectors,
+                known.faces,
+            ),
             self.nearness,
-            self._camera_T_link,
-            self._intrinsics,
+            self.sight.camera_T_link,
+            self.scene.K,
             np.float32(self.ambient or 0),
             self.box,
             self._shade,
@@ -301,7 +235,7 @@ class Renderer:
     @property
     def link(self) -> NDArray[np.int32]:
         """Link (H, W) seen at each pixel centre, -1 for the background; a new array."""
-        return self._seen(self._face_link)
+        return self._seen(self.edges.face_link)
 
     def _seen(self, of_face: Int) -> Int:
         seen = np.full(self.face.shape, -1, np.int32)
@@ -319,14 +253,4 @@ class Renderer:
     @property
     def crossings(self) -> Crossings:
         """The crossings of the last pose: views, valid until the next `draw`."""
-        n = self._count
-        return Crossings(
-            pixels=self._ends[:n, :2],
-            parts=self._ends[:n, 2:],
-            link=self._link[:n],
-            t=self._place[:n, 0],
-            point=self._point[:n],
-            gradient=self._gradient[:n],
-            slope=self._slope[:n],
-            mix=self._mix[:n],
-        )
+        return self._found.first(self._count)

@@ -111,7 +111,7 @@ def pose_costs(
     Of the robot drawn in views (N, L, 4, 4): `colour` and `region` (N, H, W), `colours_in_region` (C,) in all of them.
     `covered` (N, H, W), zero, and `counts` (M + 1, C) are scratch.
     """
-    face, box = sight[5], sight[6]
+    face, box = sight.face, sight.box
     views, last = len(parent_T_link), len(counts) - 1
     touched = np.empty(4, np.int32)
     for n in range(len(camera_T_parents)):

@@ -17,7 +17,7 @@ def coverage(scene, sight, camera_T_parent, parent_T_link, covered):
 
     `scene` and `sight` are those of a `Renderer`, `parent_T_link` is (N, L, 4, 4).
     """
-    face, box = sight[5], sight[6]
+    face, box = sight.face, sight.box
     views = len(parent_T_link)
     covered[:] = 0
     for v in range(views):
