@@ -108,7 +108,7 @@ class Renderer:
             box=np.array([0, self.width - 1, 0, self.height - 1], np.int32),
         )
         self.nearness, self.face, self.box = self.sight[4:]
-        self.edges, self._found = Edges.of(mesh), CrossingBuffers.of(self.width, self.height)
+        self.edges, self._buffers = Edges.of(mesh), CrossingBuffers.of(self.width, self.height)
         self._count = 0
         self.painted = self.box.copy()
         self._background = np.full(4, np.nan, np.float32)
@@ -148,9 +148,9 @@ class Renderer:
         Afterwards `image`, `crossings`, `depth`, `part` and `link` belong to this pose.
         """
         self.rasterise(camera_T_link)
-        count = crossing_kernels.find_crossings(self.edges, self.sight, self._found)
+        count = crossing_kernels.find_crossings(self.edges, self.sight, self._buffers)
         self._count = crossing_kernels.describe_crossings(
-            self.edges, self.sight, self.scene.K, count, self._found
+            self.edges, self.sight, self.scene.K, count, self._buffers
         )
         return self._count
 
@@ -161,12 +161,12 @@ class Renderer:
             self._image[:] = table[-1]
             self._background = table[-1].copy()
         face, face_part = self.face, self.mesh.face_part
-        edges = self._found.ends, self._found.mix, self._count, self.box, self.painted
+        edges = self._buffers.ends, self._buffers.mix, self._count, self.box, self.painted
         if self._normals is None:
             crossing_kernels.compose(face, face_part, table, *edges, self._image)
         else:
             self._light(self._normals)
-            shading.compose(face, face_part, table, self._shade, self._found.best, *edges, self._image)
+            shading.compose(face, face_part, table, self._shade, self._buffers.best, *edges, self._image)
         return self._image
 
     def image_derivative(self, colours: ArrayLike | None = None, background: ArrayLike = (0, 0, 0)) -> Float:
@@ -189,14 +189,14 @@ class Renderer:
                 self.nearness,
                 self.scene.K,
                 self.box,
-                self._found.best,
+                self._buffers.best,
                 table,
                 self._shade,
                 self._slide,
                 self._derivative,
             )
         shading.edge_rates(
-            table, self._shade, self._found.ends, self._found.mix, columns, self._count, self._derivative
+            table, self._shade, self._buffers.ends, self._buffers.mix, columns, self._count, self._derivative
         )
         return self._derivative
 
@@ -253,4 +253,9 @@ class Renderer:
     @property
     def crossings(self) -> Crossings:
         """The crossings of the last pose: views, valid until the next `draw`."""
-        return self._found.first(self._count)
+        return self._buffers.first(self._count)
+
+    @property
+    def found(self) -> tuple[CrossingBuffers, int]:
+        """The same for compiled loops: the buffers, and how many of their crossings are those of the last pose."""
+        return self._buffers, self._count

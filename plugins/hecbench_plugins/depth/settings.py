@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hecbench_plugins.maskless.search import Ball
+from hecbench_plugins.maskless.ball import Ball
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ from hecbench.se3 import Array
 from hecbench_plugins.depth.settings import DepthSettings, Stage
 from hecbench_plugins.depth.starts import around, on_a_sphere
 from hecbench_plugins.depth.views import FEWEST_VIEWS, Agreement, DepthViews
-from hecbench_plugins.maskless.align import limited
+from hecbench_plugins.maskless.refinement import limited
 from hecbench_plugins.second_order.descent import Trace
 from hecbench_plugins.second_order.silhouette import distances_at, silhouette_step
 from hecbench_plugins.views.pyramid import prepare

@@ -61,7 +61,7 @@ def of_left_out_photographs(
 
 def agreement(recording: Recording, estimate: Estimate) -> Array:
     """Rms distance of the contour, px, and the share confirmed (N, 2), for each photograph at an answer."""
-    from hecbench_plugins.maskless.align import schedule
+    from hecbench_plugins.maskless.refinement import schedule
     from hecbench_plugins.maskless.solver import Photographs
 
     photographs = Photographs.of(recording)

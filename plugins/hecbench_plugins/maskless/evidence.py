@@ -10,11 +10,9 @@ import numpy as np
 from hecbench import se3
 from hecbench.estimate import Estimate, Termination
 from hecbench.se3 import Array
-from hecbench_plugins.maskless.align import CORRELATED_POINTS, ContourEquations, Refined
-
-_PRIOR_FREEDOM = 6.0
-_DOUBTFUL = 0.5
-"""Of the median share of confirmed contour: a photograph with less disagrees with the others."""
+from hecbench_plugins.maskless.contour import ContourEquations
+from hecbench_plugins.maskless.refinement import Refined
+from hecbench_plugins.maskless.settings import CONTOUR, COURSE
 
 
 def covariance(camera_T_parent: Array, last: ContourEquations, prior: Array, shared: Array) -> Array:
@@ -24,7 +22,7 @@ def covariance(camera_T_parent: Array, last: ContourEquations, prior: Array, sha
     of the lines is divided by a factor: the mean of g' I^-1 g / 6 over the photographs, g the gradient that one
     photograph alone leaves at the common end and I its own information (the scores' variance over their
     expectation; Freedman 2006, "On the so-called Huber sandwich estimator"). With few photographs it stays near
-    `CORRELATED_POINTS`. Errors of the intrinsics are not in it.
+    `CONTOUR.correlated_points`. Errors of the intrinsics are not in it.
 
     Args:
         camera_T_parent: (4, 4).
@@ -38,7 +36,9 @@ def covariance(camera_T_parent: Array, last: ContourEquations, prior: Array, sha
         if np.trace(information) > 0
     ]
     freedom = 6.0 * (len(scores) - 1)
-    factor = (_PRIOR_FREEDOM * CORRELATED_POINTS + sum(scores)) / (_PRIOR_FREEDOM + freedom)
+    factor = (COURSE.prior_freedom * CONTOUR.correlated_points + sum(scores)) / (
+        COURSE.prior_freedom + freedom
+    )
     seen_from_camera = np.linalg.inv(last.A / factor + np.diag(prior))[:6, :6]
     return se3.inverse_covariance(camera_T_parent, seen_from_camera + shared)
 
@@ -72,7 +72,7 @@ def to_estimate(
             "doubtful_samples": [
                 name
                 for name, share in shares.items()
-                if share < _DOUBTFUL * np.median(last.view_confirmed_share)
+                if share < COURSE.doubtful * np.median(last.view_confirmed_share)
             ],
             "path": [
                 [stage, None, se3.log(se3.inverse(pose)).round(6).tolist()]

@@ -10,20 +10,10 @@ import numpy as np
 from hecbench import se3
 from hecbench.robots.posed import PosedRobot
 from hecbench.se3 import Array
-from hecbench_plugins.maskless.align import (
-    CORRELATED_POINTS,
-    FEWEST_POINTS,
-    ContourEquations,
-    ContourMatcher,
-    Refined,
-    RefinementLevel,
-    limited,
-    settled,
-)
+from hecbench_plugins.maskless.contour import ContourEquations, ContourMatcher
+from hecbench_plugins.maskless.refinement import Refined, RefinementLevel, limited, settled
+from hecbench_plugins.maskless.settings import CONTOUR, COURSE
 from hecbench_plugins.second_order.unknowns import details
-
-PRIOR_RAD = float(np.deg2rad(0.1))
-"""Standard deviation of an arm's constant joint offsets about the nominal model."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,11 +45,11 @@ def with_joint_offsets(
     """Gauss-Newton over the camera and one offset per joint, the prior weighed as the correlated points it equals."""
     offsets = np.zeros(lines.canvas.joints_rad.shape[1])
     pose, converged, iteration = camera_T_parent, False, 0
-    prior = CORRELATED_POINTS * prior_information(len(offsets))
+    prior = CONTOUR.correlated_points * prior_information(len(offsets))
     lines.learn(pose, step.spacing)
     found = compare(lines, pose, robot, offsets, step, radius_m)
     for iteration in range(1, 2 * step.rounds + 1):  # noqa: B007 the number of the last is told
-        if found.points < FEWEST_POINTS:
+        if found.points < CONTOUR.fewest_points:
             break
         A = found.A + np.diag(prior)
         b = found.b - prior * np.r_[np.zeros(6), offsets]
@@ -69,11 +59,11 @@ def with_joint_offsets(
         converged = settled(found, move)
         if converged:
             break
-    sigmas = np.sqrt(CORRELATED_POINTS * np.diag(np.linalg.inv(found.A + np.diag(prior)))[6:])
-    extras = details(robot.joint_names, offsets, sigmas, np.full(len(offsets), PRIOR_RAD))
+    sigmas = np.sqrt(CONTOUR.correlated_points * np.diag(np.linalg.inv(found.A + np.diag(prior)))[6:])
+    extras = details(robot.joint_names, offsets, sigmas, np.full(len(offsets), COURSE.joint_sigma_rad))
     return Offsets(Refined(pose, found, iteration, converged), extras)
 
 
 def prior_information(joints: int) -> Array:
     """Of the camera's six numbers, none, and of every joint offset (6 + joints,)."""
-    return np.concatenate([np.zeros(6), np.full(joints, 1 / PRIOR_RAD**2)])
+    return np.concatenate([np.zeros(6), np.full(joints, 1 / COURSE.joint_sigma_rad**2)])

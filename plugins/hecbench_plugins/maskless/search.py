@@ -10,7 +10,6 @@ from the best draws that are far from each other.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,59 +19,10 @@ from hecbench.rendering import Renderer, RenderMesh
 from hecbench.rendering.undistort import shrunk_intrinsics
 from hecbench.se3 import Array
 from hecbench.system import threads
-from hecbench_plugins.maskless import kernels
+from hecbench_plugins.maskless import search_kernels
+from hecbench_plugins.maskless.ball import Ball
+from hecbench_plugins.maskless.settings import SEARCH
 from hecbench_plugins.views.canvas import Canvas
-
-SEARCH_LEVEL = 16
-"""Of the meshes: pictures of WIDTH_PX show no more."""
-WIDTH_PX = 144
-_COLOURS = 32
-_LAB_WEIGHTS = (0.6, 1.6, 1.6)
-"""Of lightness and the two colour axes: a shadow changes the first most."""
-_KMEANS_PIXELS, _KMEANS_ROUNDS = 20000, 30
-_MOTION_WEIGHT = 4.0
-_PRIOR_WEIGHT, _BEYOND_WEIGHT, _LIMIT = 5.0, 3e3, 1.2
-_STILL = 0.3
-_REGION_POSES, _REGION_GROW_PX = 120, 9
-_DRAWS, _DRAWS_WITHOUT_MOTION = 1000, 3000
-_APART = 0.5
-_POPULATION, _GENERATIONS, _FIRST_SIGMA = 32, 40, 0.3
-
-
-@dataclass(frozen=True)
-class Ball:
-    """How far off the start may be: the camera's centre, m, and its rotation, rad."""
-
-    centre_m: float
-    turn_rad: float
-
-    def __str__(self) -> str:
-        return f"{self.centre_m:g} m and {np.rad2deg(self.turn_rad):.0f} deg"
-
-    @property
-    def scale(self) -> Array:
-        """(6,) of the coordinates of a pose in the ball."""
-        return np.array([self.centre_m] * 3 + [self.turn_rad] * 3)
-
-    def pose(self, start: Array, x: Array) -> Array:
-        """parent_T_camera (..., 4, 4) whose centre is moved by x[..., :3] m in the parent's frame and that is turned by
-        the rotation vector x[..., 3:] rad in its own.
-        """
-        return se3.make(start[:3, :3] @ se3.so3_exp(x[..., 3:]), start[:3, 3] + x[..., :3])
-
-    def away(self, start: Array, pose: Array) -> tuple[float, float]:
-        """Distance and turn of a pose from the start, in radii."""
-        return (
-            float(se3.translation_error_m(start, pose)) / self.centre_m,
-            float(se3.rotation_error_rad(start, pose)) / self.turn_rad,
-        )
-
-    def draw(self, rng: np.random.Generator, count: int) -> Array:
-        """(count, 6) coordinates drawn in the ball and a tenth beyond."""
-        directions = rng.normal(size=(count, 2, 3))
-        directions /= np.linalg.norm(directions, axis=2, keepdims=True)
-        radii = 1.1 * np.sqrt(rng.random((count, 2, 1)))
-        return np.asarray((directions * radii).reshape(count, 6) * self.scale)
 
 
 class Score:
@@ -88,8 +38,8 @@ class Score:
         """`foreground` (N, H, W): how much each pixel of the canvas differs from the background, None if unknown."""
         import cv2
 
-        height = round(WIDTH_PX * canvas.valid.shape[0] / canvas.valid.shape[1])
-        size = (WIDTH_PX, height)
+        height = round(SEARCH.width_px * canvas.valid.shape[0] / canvas.valid.shape[1])
+        size = (SEARCH.width_px, height)
         factors = size[0] / canvas.valid.shape[1], size[1] / canvas.valid.shape[0]
         self._size, self._canvas = size, canvas
         self.evaluations = 0
@@ -102,7 +52,7 @@ class Score:
         self._foreground = np.zeros((0, *self._valid.shape), np.float32)
         if foreground is not None:
             self._foreground = np.stack([small(view) for view in foreground])
-        self._still = (self._foreground.max(0, initial=0.0) < _STILL).astype(np.float32)
+        self._still = (self._foreground.max(0, initial=0.0) < SEARCH.still).astype(np.float32)
         self._colour = _clustered([small(image) for image in canvas.images], self._valid, rng)
         self._limit_to(np.repeat(self._valid[None], len(canvas), 0))
         _, material = np.unique(mesh.colours.round(3), axis=0, return_inverse=True)
@@ -124,13 +74,13 @@ class Score:
             for pose in camera_T_parents:
                 self._renderers[0].rasterise(pose @ links)
                 seen |= self._renderers[0].face >= 0
-            grown = cv2.dilate(seen, np.ones((_REGION_GROW_PX,) * 2, np.uint8))
+            grown = cv2.dilate(seen, np.ones((SEARCH.region_grow_px,) * 2, np.uint8))
             region[view] = self._valid & (grown > 0)
         self._limit_to(region)
 
     def _limit_to(self, region: NDArray[np.bool_]) -> None:
         self._region = region
-        self._colours_in_region = np.bincount(self._colour[region], minlength=_COLOURS).astype(float)
+        self._colours_in_region = np.bincount(self._colour[region], minlength=SEARCH.colours).astype(float)
 
     def __call__(self, camera_T_parents: Array) -> Array:
         """Costs (n,) of poses (n, 4, 4)."""
@@ -141,7 +91,7 @@ class Score:
 
     def _costs(self, renderer: Renderer, poses: Array) -> Array:
         costs = np.empty(len(poses))
-        kernels.pose_costs(
+        search_kernels.pose_costs(
             renderer.scene,
             renderer.sight,
             poses,
@@ -153,9 +103,9 @@ class Score:
             self._foreground,
             self._still,
             self._valid,
-            _MOTION_WEIGHT,
+            SEARCH.motion_weight,
             np.zeros(self._colour.shape, np.uint8),
-            np.zeros((self._materials + 1, _COLOURS)),
+            np.zeros((self._materials + 1, SEARCH.colours)),
             costs,
         )
         return costs
@@ -168,14 +118,14 @@ def _clustered(
     import cv2
 
     lab = [
-        cv2.cvtColor(image / np.float32(255), cv2.COLOR_RGB2LAB) * np.array(_LAB_WEIGHTS, np.float32)
+        cv2.cvtColor(image / np.float32(255), cv2.COLOR_RGB2LAB) * np.array(SEARCH.lab_weights, np.float32)
         for image in images
     ]
     pixels = np.concatenate([picture[valid] for picture in lab])
-    chosen = pixels[rng.permutation(len(pixels))[:_KMEANS_PIXELS]]
+    chosen = pixels[rng.permutation(len(pixels))[: SEARCH.kmeans_pixels]]
     cv2.setRNGSeed(int(rng.integers(1 << 30)))
-    stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, _KMEANS_ROUNDS, 0.1)
-    _, _, centres = cv2.kmeans(chosen, _COLOURS, None, stop, 1, cv2.KMEANS_PP_CENTERS)
+    stop = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, SEARCH.kmeans_rounds, 0.1)
+    _, _, centres = cv2.kmeans(chosen, SEARCH.colours, None, stop, 1, cv2.KMEANS_PP_CENTERS)
     squares = (centres**2).sum(1)
     nearest = [(squares - 2 * picture.reshape(-1, 3) @ centres.T).argmin(1) for picture in lab]
     return np.stack(nearest).reshape(len(images), *valid.shape).astype(np.int32)
@@ -185,7 +135,7 @@ def search(
     score: Score, start: Array, ball: Ball, restarts: int, rng: np.random.Generator
 ) -> Iterator[tuple[Array, float]]:
     """The best parent_T_camera of each descent and its cost, descents from the best draws first."""
-    draws = _DRAWS if score.has_motion else _DRAWS_WITHOUT_MOTION
+    draws = SEARCH.draws if score.has_motion else SEARCH.draws_without_motion
     coordinates = np.concatenate([np.zeros((1, 6)), ball.draw(rng, draws)])
 
     def poses(x: Array) -> Array:
@@ -193,19 +143,21 @@ def search(
 
     def cost(x: Array) -> Array:
         off = np.linalg.norm((x / ball.scale).reshape(-1, 2, 3), axis=2)
-        beyond = np.maximum(off - _LIMIT, 0).sum(1)
-        return np.asarray(score(poses(x)) + _PRIOR_WEIGHT * (off**2).sum(1) + _BEYOND_WEIGHT * beyond)
+        beyond = np.maximum(off - SEARCH.limit, 0).sum(1)
+        return np.asarray(
+            score(poses(x)) + SEARCH.prior_weight * (off**2).sum(1) + SEARCH.beyond_weight * beyond
+        )
 
-    score.limit_region(poses(coordinates[:_REGION_POSES]))
+    score.limit_region(poses(coordinates[: SEARCH.region_poses]))
     order = cost(coordinates).argsort()
     seeds: list[Array] = []
     for x in coordinates[order]:
         if len(seeds) == restarts:
             break
-        if all(np.linalg.norm((x - seed) / ball.scale) > _APART for seed in seeds):
+        if all(np.linalg.norm((x - seed) / ball.scale) > SEARCH.apart for seed in seeds):
             seeds.append(x)
     for seed in seeds:
-        x, lowest = minimise(cost, seed, _FIRST_SIGMA * ball.scale, rng)
+        x, lowest = minimise(cost, seed, SEARCH.first_sigma * ball.scale, rng)
         yield ball.pose(start, x), lowest
 
 
@@ -216,7 +168,7 @@ def minimise(
 
     Parameters as Hansen 2016, table 1, without negative weights.
     """
-    d, n, parents = len(start), _POPULATION, _POPULATION // 2
+    d, n, parents = len(start), SEARCH.population, SEARCH.population // 2
     weights = np.log(parents + 0.5) - np.log(np.arange(1, parents + 1))
     weights /= weights.sum()
     effective = 1 / (weights**2).sum()
@@ -229,7 +181,7 @@ def minimise(
     mean, covariance, step = start.astype(float), np.eye(d), 1.0
     path, step_path = np.zeros(d), np.zeros(d)
     best, lowest = mean, np.inf
-    for generation in range(_GENERATIONS):
+    for generation in range(SEARCH.generations):
         values, axes = np.linalg.eigh(covariance)
         lengths = np.sqrt(np.maximum(values, 1e-20))
         moves = rng.normal(size=(n, d)) * lengths @ axes.T
@@ -254,6 +206,6 @@ def minimise(
             + rank_many * (chosen.T * weights) @ chosen
         )
         step *= float(np.exp(keep_step / damping * (length / expected - 1)))
-        if step * lengths.max() < 1e-3:
+        if step * lengths.max() < SEARCH.settled:
             break
     return best, lowest

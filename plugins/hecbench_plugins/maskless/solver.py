@@ -16,19 +16,12 @@ from hecbench.rendering import RenderMesh
 from hecbench.robots.posed import PosedRobot
 from hecbench.se3 import Array
 from hecbench_plugins.maskless import evidence
-from hecbench_plugins.maskless.align import (
-    FEWEST_POINTS,
-    Background,
-    ContourEquations,
-    ContourMatcher,
-    Refined,
-    RefinementLevel,
-    refine,
-    refine_further,
-    schedule,
-)
+from hecbench_plugins.maskless.ball import Ball
+from hecbench_plugins.maskless.contour import Background, ContourEquations, ContourMatcher
 from hecbench_plugins.maskless.offsets import compare, prior_information, with_joint_offsets
-from hecbench_plugins.maskless.search import SEARCH_LEVEL, Ball, Score, search
+from hecbench_plugins.maskless.refinement import Refined, RefinementLevel, refine, refine_further, schedule
+from hecbench_plugins.maskless.search import Score, search
+from hecbench_plugins.maskless.settings import CONTOUR, COURSE, SEARCH
 from hecbench_plugins.second_order.unknowns import Unknown
 from hecbench_plugins.start_search.by_photographs import starts
 from hecbench_plugins.start_search.view_sphere import ViewSphere
@@ -36,21 +29,6 @@ from hecbench_plugins.views import scene_background
 from hecbench_plugins.views.canvas import Canvas, undistorted_canvas
 from hecbench_plugins.views.common_error import common_error
 from hecbench_plugins.views.pyramid import mesh_at, meshes_by_level, photographed_robot
-
-NEAR, FAR = Ball(0.1, np.deg2rad(10)), Ball(0.2, np.deg2rad(20))
-"""How far off a start may be."""
-_SEARCH_VIEWS = 8
-_FEWEST_FOR_FAR = 3
-"""Views from which the larger ball is searched at once; fewer find the smaller one's end more surely."""
-_OUTSIDE = 1.4
-"""Radii of the ball beyond which an end is not believed."""
-_FREE_BALL, _FREE_STARTS = Ball(0.35, np.deg2rad(18)), 6
-"""What the lattice of a search without a start leaves open about each of its starts, and how many are followed."""
-_ROUGHLY = 1.0
-"""Standard deviations that a move may have before it is asked whether the arm carries something."""
-_TOOL_M = 0.15
-_TOOL_SHARE = 0.6
-"""Of the contour near the flange so much must be confirmed, against the rest, or something unknown is mounted there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,7 +80,7 @@ class Photographs:
         except InputError as error:
             raise Refusal(str(error)) from error
         search_views = canvas.subset(
-            np.unique(np.linspace(0, len(canvas) - 1, _SEARCH_VIEWS).round().astype(int))
+            np.unique(np.linspace(0, len(canvas) - 1, COURSE.search_views).round().astype(int))
         )
         fixed = recording.mounting is Mounting.EYE_TO_HAND and len(canvas) >= scene_background.FEWEST_VIEWS
         background = Background.of(canvas.images) if fixed else None
@@ -182,12 +160,12 @@ class Maskless:
         search_views, foreground = photographs.search_views, photographs.foreground()
         best: Candidate | None = None
         for place in self._places(photographs, start, foreground):
-            score = Score(photographs.meshes[SEARCH_LEVEL], search_views, foreground, rng)
+            score = Score(photographs.meshes[SEARCH.level], search_views, foreground, rng)
             for coarse, _ in search(score, place.start, place.ball, place.restarts, rng):
                 photographs.descents += 1
                 end = photographs.refined(se3.inverse(coarse))
                 away = place.ball.away(place.start, se3.inverse(end.camera_T_parent))
-                sharp = end.last.confirmed_share if max(away) < _OUTSIDE else 0.0
+                sharp = end.last.confirmed_share if max(away) < COURSE.outside else 0.0
                 if best is None or sharp > best.confirmed_share:
                     path = (("start", se3.inverse(place.start)), ("search", se3.inverse(coarse)))
                     best = Candidate(end.camera_T_parent, sharp, place, path)
@@ -204,12 +182,16 @@ class Maskless:
     ) -> list[SearchRegion]:
         """Where to search, in this order."""
         if self.free is not None and foreground is not None:
-            mesh = photographs.meshes[SEARCH_LEVEL]
+            mesh = photographs.meshes[SEARCH.level]
             seen = photographs.search_views
-            found = starts(mesh, seen.K, seen.valid, seen.parent_T_link, foreground, self.free, _FREE_STARTS)
-            return [SearchRegion(se3.inverse(pose), _FREE_BALL, 1) for pose in found]
+            found = starts(
+                mesh, seen.K, seen.valid, seen.parent_T_link, foreground, self.free, COURSE.free_starts
+            )
+            return [SearchRegion(se3.inverse(pose), COURSE.free_ball, 1) for pose in found]
         assert start is not None
-        balls = (FAR,) if len(photographs.canvas) >= _FEWEST_FOR_FAR else (NEAR, FAR)
+        balls = (
+            (COURSE.far,) if len(photographs.canvas) >= COURSE.fewest_for_far else (COURSE.near, COURSE.far)
+        )
         return [SearchRegion(start, ball, self.restarts) for ball in balls for _ in range(self.attempts)]
 
     def _finish(self, photographs: Photographs, found: Candidate) -> Estimate:
@@ -218,10 +200,10 @@ class Maskless:
         _, last = schedule(canvas.valid.shape[1])
         path = [*found.path, ("refined", found.camera_T_parent)]
         lines = photographs.lines(last, canvas)
-        end = refine(lines, found.camera_T_parent, last, _ROUGHLY)
+        end = refine(lines, found.camera_T_parent, last, COURSE.roughly)
         rest, left_out_m = _without_tool(lines, end, last.spacing), 0.0
         if rest is not None:
-            end, left_out_m = replace(end, last=rest), _TOOL_M
+            end, left_out_m = replace(end, last=rest), COURSE.tool_m
         end = refine_further(lines, end, last, left_out_m)
         extras: dict[str, Any] = {}
         robot, nominal = photographs.robot, np.zeros(canvas.joints_rad.shape[1])
@@ -255,8 +237,10 @@ def _without_tool(lines: ContourMatcher, end: Refined, spacing: float) -> Contou
     """
     if lines.canvas.flange is None:
         return None
-    whole, rest = end.last, lines(end.camera_T_parent, spacing, radius_m=_TOOL_M)
+    whole, rest = end.last, lines(end.camera_T_parent, spacing, radius_m=COURSE.tool_m)
     judged = whole.view_judged.sum() - rest.view_judged.sum()
     confirmed = whole.view_confirmed_share @ whole.view_judged - rest.view_confirmed_share @ rest.view_judged
-    carries = judged >= FEWEST_POINTS and confirmed < _TOOL_SHARE * rest.confirmed_share * judged
+    carries = (
+        judged >= CONTOUR.fewest_points and confirmed < COURSE.tool_share * rest.confirmed_share * judged
+    )
     return rest if carries else None

@@ -9,7 +9,7 @@ import numpy as np
 
 from hecbench import se3
 from hecbench.se3 import Array
-from hecbench_plugins.maskless.align import ContourEquations
+from hecbench_plugins.maskless.contour import ContourEquations
 from hecbench_plugins.watching.settings import WatchSettings
 
 

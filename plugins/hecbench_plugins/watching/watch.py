@@ -1,8 +1,8 @@
 """Whether a calibration is still true, from the robot's own contour in every frame.
 
-Each frame gives the normal equations of the contour about the camera's known pose (`maskless.align`), with a column for
-every joint. The first frames give a reference: the camera's pose, the joints' constant offsets and the usual misfit.
-Afterwards the frames of a short window are added up, the joints are eliminated within what the first frames left open,
+Each frame gives the normal equations of the contour about the camera's known pose (`maskless.contour`), with a column
+for every joint. The first frames give a reference: the camera's pose, the joints' constant offsets and the usual
+misfit. Afterwards the frames of a short window are added up, the joints are eliminated within what the first frames left open,
 and the camera's offset is standardised. The sum of its squares is a test for a jump with the shortest delay (after
 Willsky and Jones 1976, "A generalized likelihood ratio approach to the detection and estimation of jumps in linear
 systems"). A hidden robot confirms less of its contour: then nothing is concluded.
@@ -25,7 +25,8 @@ from hecbench.recording import Mounting, Recording
 from hecbench.robots.posed import PosedRobot
 from hecbench.se3 import Array
 from hecbench.workspace import apart_m, points_in_parent
-from hecbench_plugins.maskless.align import ContourEquations, ContourMatcher, RefinementLevel, refine
+from hecbench_plugins.maskless.contour import ContourEquations, ContourMatcher
+from hecbench_plugins.maskless.refinement import RefinementLevel, refine
 from hecbench_plugins.views.canvas import Canvas, Rectification
 from hecbench_plugins.views.pyramid import mesh_at, meshes_by_level
 from hecbench_plugins.views.spool import Spool

@@ -2,18 +2,20 @@
 
 import numpy as np
 import pytest
-from hecbench_plugins.maskless import kernels
-from hecbench_plugins.maskless.search import Ball, minimise
+from hecbench_plugins.maskless import contour_kernels, search_kernels
+from hecbench_plugins.maskless.ball import Ball
+from hecbench_plugins.maskless.contour_buffers import ContourPoints, KnownColours, KnownScene
+from hecbench_plugins.maskless.search import minimise
 
 from hecbench import se3
 
-BINS = kernels.BINS**3
+BINS = contour_kernels.BINS**3
 
 
 def test_mutual_information_of_equal_labels_is_their_entropy():
     counts = np.diag([300.0, 300.0, 300.0])
     bias = 0.5 * 2 * 2
-    assert kernels.mutual_information(counts) == pytest.approx(900 * np.log(3) - bias, rel=1e-6)
+    assert search_kernels.mutual_information(counts) == pytest.approx(900 * np.log(3) - bias, rel=1e-6)
 
 
 def test_mutual_information_of_independent_labels_is_nothing_on_average(rng):
@@ -22,7 +24,7 @@ def test_mutual_information_of_independent_labels_is_nothing_on_average(rng):
         labels, colours = rng.integers(0, 4, 2000), rng.integers(0, 8, 2000)
         counts = np.zeros((4, 8))
         np.add.at(counts, (labels, colours), 1)
-        found.append(kernels.mutual_information(counts))
+        found.append(search_kernels.mutual_information(counts))
     assert abs(np.mean(found)) < 0.5
 
 
@@ -54,7 +56,7 @@ def motion(covered, foreground):
     still = (foreground.max(0) < 0.3).astype(np.float32)
     nowhere = foreground.sum() / len(foreground)
     everywhere = np.zeros(4, np.int32)
-    return nowhere + kernels.motion_cost(covered, foreground, still, np.ones((1, 1), bool), everywhere)
+    return nowhere + search_kernels.motion_cost(covered, foreground, still, np.ones((1, 1), bool), everywhere)
 
 
 def test_coverage_that_explains_what_changed_costs_nothing():
@@ -76,7 +78,7 @@ def test_likelihoods_are_densities_and_lean_on_their_group(rng):
     counts = np.zeros((3, BINS), np.float32)
     counts[0, :100], counts[1, 2000:2100] = 50, 50
     out = np.zeros((3, BINS), np.float32)
-    kernels.likelihoods(counts, 0.3, np.array([0, 0, 1]), 50.0, out, np.zeros((4, BINS)))
+    contour_kernels.likelihoods(counts, 0.3, np.array([0, 0, 1]), 50.0, out, np.zeros((4, BINS)))
     density = np.exp(out.astype(float))
     np.testing.assert_allclose(density.sum(1)[:2], 1, rtol=1e-3)
     assert density[0, 50] > density[1, 50] > 10 * density[2, 50]
@@ -91,32 +93,22 @@ def test_a_line_finds_a_displaced_edge(offset_px, background_known):
     image[:, : int(edge + offset_px)] = (40, 60, 90)
     face = np.where(np.arange(width) < edge, 0, -1).astype(np.int32) * np.ones((height, 1), np.int32)
     log_inside, log_around = (np.full((1, BINS), np.log(0.03 / BINS), np.float32) for _ in range(2))
-    log_inside[0, kernels.colour_bin(image, 0, 0)] = np.log(0.97)
-    log_around[0, kernels.colour_bin(image, 0, width - 1)] = np.log(0.97)
-    contour = np.array([[edge - 0.5, 20.0, 1.0, 0.0]])
-    scene = np.full((height if background_known else 0, width, 3), 200, np.uint8)
-    agreement = np.ones((height if background_known else 0, width), np.float32)
-    mean, variance = np.zeros(1), np.zeros(1)
-    kernels.line_posteriors(
-        contour,
-        np.array([[0, -1]], np.int32),
-        1,
-        face,
-        np.zeros(1, np.int32),
-        image,
-        image,
-        np.ones((height, width), bool),
-        log_inside,
-        log_around,
-        np.exp(log_around).mean(0),
-        scene,
-        agreement,
-        np.zeros((height, width), np.int16),
-        4,
-        8,
-        1.0,
-        mean,
-        variance,
+    log_inside[0, contour_kernels.colour_bin(image, 0, 0)] = np.log(0.97)
+    log_around[0, contour_kernels.colour_bin(image, 0, width - 1)] = np.log(0.97)
+    points = ContourPoints.of(1)
+    points.place[0], points.parts[0] = (edge - 0.5, 20.0, 1.0, 0.0), (0, -1)
+    rows = height if background_known else 0
+    scene = KnownScene(
+        valid=np.ones((height, width), bool),
+        background=np.full((rows, width, 3), 200, np.uint8),
+        agreement=np.ones((rows, width), np.float32),
+        covered=np.zeros((height, width), np.int16),
+        views=4,
     )
+    colours = KnownColours(log_inside, log_around, np.exp(log_around).mean(0))
+    contour_kernels.line_posteriors(
+        points, 1, face, np.zeros(1, np.int32), image, image, colours, scene, 8, 1.0
+    )
+    mean, variance = points.mean, points.variance
     assert mean[0] == pytest.approx(offset_px, abs=0.3)
     assert 0 < variance[0] < 1

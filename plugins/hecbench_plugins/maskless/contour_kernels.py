@@ -1,27 +1,18 @@
-# mypy: disable-error-code="no-untyped-def,assignment"
+# mypy: disable-error-code="no-untyped-def"
 # ruff: noqa: ANN001, ANN201
-"""The compiled loops of the maskless stages."""
+"""The compiled loops over the contour: colours on both sides of it, and where it really lies.
+
+`points`, `colours` and `scene` are `ContourPoints`, `KnownColours` and `KnownScene`.
+"""
 
 from __future__ import annotations
 
 import numba
 import numpy as np
 
-from hecbench.rendering.kernels import see
+from hecbench_plugins.maskless.settings import COLOURS
 
-BINS = 16
-"""Of a colour histogram, per channel."""
-_CLIP = 4.0
-"""Most that one pixel's colour may say, nats."""
-_TAU = 2.0
-"""Neighbouring pixels of a line resemble each other: each counts as a half."""
-_EDGE_WEIGHT, _EDGE_GREY, _EDGE_MOST = 0.5, 20.0, 2.0
-_BACKGROUND_SIGMA, _HISTOGRAM_SHARE, _UNIFORM_SHARE = 7.0, 0.1, 0.03
-_UNLIKE_BACKGROUND = 12
-_COVERED_OFTEN, _FREE_LEAST, _AGREE_SHARE = 0.7, 0.25, 0.6
-_EMPTY = 1e-9
-"""Added to every count, so that an empty cell has a logarithm."""
-_MOST_COVERED, _COVERED_WEIGHT, _STILL_WEIGHT = 0.9, 0.7, 0.05
+BINS = COLOURS.bins
 
 _jit = numba.njit(fastmath=True, cache=True, nogil=True)
 
@@ -42,108 +33,12 @@ def mark_covered(face, box, covered):
 
 
 @_jit
-def motion_cost(covered_by, foreground, still, valid, box):
-    """How badly predicted coverage (N, H, W) explains which pixels differ from the background, px per view.
-
-    A pixel that no view covers must look like background in all. One that some views cover must differ there and
-    nowhere else. One that (nearly) all cover says nothing, since its background is never seen; a little against it if
-    it is `still` (H, W). `foreground` (N, H, W) are the differences in [0, 1]. Less the cost of a robot that is
-    nowhere, so that only pixels in the `box` that some view covers count.
-    """
-    views = len(covered_by)
-    cost = 0.0
-    for y in range(box[2], box[3] + 1):
-        for x in range(box[0], box[1] + 1):
-            if not valid[y, x]:
-                continue
-            count = 0
-            for v in range(views):
-                count += covered_by[v, y, x]
-            if count >= _MOST_COVERED * views:
-                cost += _STILL_WEIGHT * views * still[y, x]
-                for v in range(views):
-                    cost -= foreground[v, y, x]
-            elif count > 0:
-                for v in range(views):
-                    if covered_by[v, y, x]:
-                        cost += _COVERED_WEIGHT * (1 - foreground[v, y, x]) - foreground[v, y, x]
-    return cost / views
-
-
-@_jit
-def mutual_information(counts):
-    """Of a table of counts (M, C), nats times count, less what independent draws would show on average."""
-    rows, columns = counts.shape
-    by_row, by_column = np.zeros(rows), np.zeros(columns)
-    for i in range(rows):
-        for j in range(columns):
-            by_row[i] += counts[i, j] + _EMPTY
-            by_column[j] += counts[i, j] + _EMPTY
-    total = by_row.sum()
-    found = 0.0
-    for i in range(rows):
-        for j in range(columns):
-            filled = counts[i, j] + _EMPTY
-            found += filled * np.log(filled * total / (by_row[i] * by_column[j]))
-    return found - 0.5 * (rows - 1) * (columns - 1)
-
-
-@_jit
-def pose_costs(
-    scene,
-    sight,
-    camera_T_parents,
-    parent_T_link,
-    face_material,
-    colour,
-    region,
-    colours_in_region,
-    foreground,
-    still,
-    valid,
-    motion_weight,
-    covered,
-    counts,
-    costs,
-):
-    """Fill `costs` (n,) of poses (n, 4, 4): mutual information and, where there is a `foreground`, motion, px per view.
-
-    Of the robot drawn in views (N, L, 4, 4): `colour` and `region` (N, H, W), `colours_in_region` (C,) in all of them.
-    `covered` (N, H, W), zero, and `counts` (M + 1, C) are scratch.
-    """
-    face, box = sight.face, sight.box
-    views, last = len(parent_T_link), len(counts) - 1
-    touched = np.empty(4, np.int32)
-    for n in range(len(camera_T_parents)):
-        counts[:] = 0.0
-        counts[last] = colours_in_region
-        touched[0], touched[1], touched[2], touched[3] = face.shape[1], -1, face.shape[0], -1
-        for v in range(views):
-            see(scene, sight, camera_T_parents[n], parent_T_link[v])
-            touched[0], touched[1] = min(touched[0], box[0]), max(touched[1], box[1])
-            touched[2], touched[3] = min(touched[2], box[2]), max(touched[3], box[3])
-            for y in range(box[2], box[3] + 1):
-                for x in range(box[0], box[1] + 1):
-                    f = face[y, x]
-                    if f < 0:
-                        continue
-                    covered[v, y, x] = 1
-                    if region[v, y, x]:
-                        counts[face_material[f], colour[v, y, x]] += 1
-                        counts[last, colour[v, y, x]] -= 1
-        costs[n] = -mutual_information(counts) / views
-        if len(foreground) > 0:
-            costs[n] += motion_weight * motion_cost(covered, foreground, still, valid, touched)
-        covered[:, touched[2] : touched[3] + 1, touched[0] : touched[1] + 1] = 0
-
-
-@_jit
-def count_inside(face, face_part, box, image, valid, background, covered, views, inside):
+def count_inside(face, face_part, box, image, scene, inside):
     """Colours of the parts: adds to `inside` (P, BINS^3) over pixels whose neighbours are all robot.
 
-    Where few enough views cover a pixel, its background is known: what looks like that is not the robot. Without a
-    known background `background` has no rows.
+    Where few enough views cover a pixel, its background is known: what looks like that is not the robot.
     """
+    valid, background, _, covered, views = scene
     height, width = face.shape
     known = len(background) > 0
     for y in range(max(1, box[2]), min(height - 2, box[3]) + 1):
@@ -153,19 +48,20 @@ def count_inside(face, face_part, box, image, valid, background, covered, views,
                 continue
             if face[y - 1, x] < 0 or face[y + 1, x] < 0 or face[y, x - 1] < 0 or face[y, x + 1] < 0:
                 continue
-            if known and covered[y, x] < _COVERED_OFTEN * views:
+            if known and covered[y, x] < COLOURS.covered_often * views:
                 off = np.int64(0)
                 for c in range(3):
                     off = max(off, abs(np.int64(image[y, x, c]) - np.int64(background[y, x, c])))
-                if off < _UNLIKE_BACKGROUND:
+                if off < COLOURS.unlike_background:
                     continue
             inside[face_part[f], colour_bin(image, y, x)] += 1.0
 
 
 @_jit
-def count_around(contour, parts, count, face, image, valid, reach, around):
+def count_around(points, count, face, image, valid, reach, around):
     """Colours around the parts: adds to `around` (P, BINS^3) what lies `reach` px or less outside their contours."""
     height, width = face.shape
+    contour, parts = points.place, points.parts
     for n in range(count):
         if parts[n, 1] >= 0:
             continue
@@ -200,7 +96,7 @@ def likelihoods(counts, share, group, floor, out, scratch):
                 scratch[group[p], b] += counts[p, b]
                 sums[group[p]] += counts[p, b]
     first, second = scratch[groups], scratch[groups + 1]
-    uniform = _UNIFORM_SHARE / size
+    uniform = COLOURS.uniform_share / size
     for p in range(parts):
         own = 0.0
         for b in range(size):
@@ -220,22 +116,21 @@ def likelihoods(counts, share, group, floor, out, scratch):
             stride *= BINS
         for b in range(size):
             total += second[b]
-        scale = (1 - _UNIFORM_SHARE) / max(total, 1e-9)
+        scale = (1 - COLOURS.uniform_share) / max(total, 1e-9)
         for b in range(size):
             out[p, b] = np.log(scale * second[b] + uniform)
 
 
 @_jit
-def contour_points(
-    pixels, ends, t, slope, point, gradient, nearness, centre, radius, contour, normal_rate, parts, kept
-):
-    """Crossings as contour points: place and outward normal `contour` (n, 4), its motion `normal_rate` (n, 3), parts.
+def contour_points(crossings, found, nearness, centre, radius, points):
+    """The first `found` of a renderer's `CrossingBuffers` as contour points; returns how many there are.
 
-    Only edges at 45 degrees or more to their pair count, each once. `normal_rate` is px/m along the outward normal by
-    the motion of the point in the camera frame. Points within `radius` of `centre` (3,), both m in the camera frame,
-    as the camera sees it, are left out; 0 leaves none out. `parts` (n, 2): inside and outside, `kept` (n,) which
-    crossing. Returns n.
+    Fills `place`, `normal_rate`, `parts` and `kept`. Only edges at 45 degrees or more to their pair count, each once.
+    Points within `radius` of `centre` (3,), both m in the camera frame, as the camera sees it, are left out; 0 leaves
+    none out.
     """
+    _, _, _, place, _, ends, _, point, gradient, slope, _ = crossings
+    contour, normal_rate, parts, kept, _, _ = points
     width = nearness.shape[1]
     flat = nearness.reshape(-1)
     far = np.sqrt(centre[0] ** 2 + centre[1] ** 2 + centre[2] ** 2)
@@ -243,8 +138,8 @@ def contour_points(
     if radius > 0 and far > 0:
         least = np.cos(np.arcsin(min(0.99, radius / far)))
     count = 0
-    for n in range(len(t)):
-        k = slope[n]
+    for n in range(min(found, len(contour))):
+        k, t = slope[n], place[n, 0]
         if abs(k) > 1:
             continue
         X, Y, Z = point[n, 0], point[n, 1], point[n, 2]
@@ -252,62 +147,45 @@ def contour_points(
             along = (X * centre[0] + Y * centre[1] + Z * centre[2]) / (far * np.sqrt(X * X + Y * Y + Z * Z))
             if along > least:
                 continue
-        p, q = pixels[n, 0], pixels[n, 1]
+        p, q = ends[n, 0], ends[n, 1]
         horizontal = q - p == 1
         length = 1 / np.sqrt(1 + k * k)
         inside_p = flat[p] >= flat[q]
         sign = length if inside_p else -length
         x, y = np.float32(p % width), np.float32(p // width)
         if horizontal:
-            contour[count, 0], contour[count, 1] = x + t[n], y
+            contour[count, 0], contour[count, 1] = x + t, y
             contour[count, 2], contour[count, 3] = sign, -k * sign
         else:
-            contour[count, 0], contour[count, 1] = x, y + t[n]
+            contour[count, 0], contour[count, 1] = x, y + t
             contour[count, 2], contour[count, 3] = -k * sign, sign
         for c in range(3):
             normal_rate[count, c] = sign * gradient[n, c]
-        parts[count, 0] = ends[n, 0] if inside_p else ends[n, 1]
-        parts[count, 1] = ends[n, 1] if inside_p else ends[n, 0]
+        parts[count, 0] = ends[n, 2] if inside_p else ends[n, 3]
+        parts[count, 1] = ends[n, 3] if inside_p else ends[n, 2]
         kept[count] = n
         count += 1
     return count
 
 
 @_jit
-def line_posteriors(
-    contour,
-    parts,
-    count,
-    face,
-    face_part,
-    image,
-    smooth,
-    valid,
-    log_inside,
-    log_around,
-    mean_around,
-    background,
-    agreement,
-    covered,
-    views,
-    half,
-    step,
-    mean,
-    variance,
-):
+def line_posteriors(points, count, face, face_part, image, smooth, colours, scene, half, step):
     """Posterior mean and variance, px along the outward normal, of where each contour point really is.
 
     2 * `half` samples, `step` px apart, are compared: is this pixel the part, or what surrounds it? Every place of
     the contour between them explains those inside as part and those outside as surroundings, and earns by how strong
     the image's edge is there. Variance -1: no say, the point is too near the border.
     """
+    contour, _, parts, _, mean, variance = points
+    log_inside, log_around, mean_around = colours
+    valid, background, agreement, covered, views = scene
     height, width = face.shape
     samples = 2 * half
     log_ratio = np.empty(samples)
     score = np.empty(samples + 1)
     known = len(background) > 0
-    peak = (1 - _HISTOGRAM_SHARE) * (16 / (_BACKGROUND_SIGMA * 2.5066282746)) ** 3
-    uniform = _UNIFORM_SHARE / BINS**3
+    peak = (1 - COLOURS.histogram_share) * (16 / (COLOURS.background_sigma * 2.5066282746)) ** 3
+    uniform = COLOURS.uniform_share / BINS**3
     for n in range(count):
         mean[n], variance[n] = 0.0, -1.0
         u, v, nx, ny = contour[n, 0], contour[n, 1], contour[n, 2], contour[n, 3]
@@ -336,17 +214,17 @@ def line_posteriors(
                 if known:
                     free = views - covered[y, x]
                     if (
-                        free >= max(2.0, _FREE_LEAST * views)
-                        and agreement[y, x] * views >= _AGREE_SHARE * free - 1
+                        free >= max(2.0, COLOURS.free_least * views)
+                        and agreement[y, x] * views >= COLOURS.agree_share * free - 1
                     ):
                         square = 0.0
                         for c in range(3):
                             off = np.float64(image[y, x, c]) - np.float64(background[y, x, c])
                             square += off * off
-                        likely = peak * np.exp(-square / (2 * _BACKGROUND_SIGMA**2))
-                        other = np.log(likely + _HISTOGRAM_SHARE * mean_around[b] + uniform)
+                        likely = peak * np.exp(-square / (2 * COLOURS.background_sigma**2))
+                        other = np.log(likely + COLOURS.histogram_share * mean_around[b] + uniform)
                 log_ratio[k] = log_inside[mine, b] - other
-            log_ratio[k] = min(max(log_ratio[k], -_CLIP), _CLIP)
+            log_ratio[k] = min(max(log_ratio[k], -COLOURS.clip_nats), COLOURS.clip_nats)
         if cut:
             continue
         explained = 0.0
@@ -363,7 +241,9 @@ def line_posteriors(
             if min(x0, x1, y0, y1) >= 0 and max(x0, x1) < width and max(y0, y1) < height:
                 for c in range(3):
                     edge = max(edge, abs(np.float64(smooth[y1, x1, c]) - np.float64(smooth[y0, x0, c])) / 2)
-            score[j] = explained / _TAU + _EDGE_WEIGHT * min(edge / _EDGE_GREY, _EDGE_MOST)
+            score[j] = explained / COLOURS.neighbours_alike + COLOURS.edge_weight * min(
+                edge / COLOURS.edge_grey, COLOURS.edge_most
+            )
             best = max(best, score[j])
             if j < samples:
                 explained += 2 * log_ratio[j]
@@ -379,14 +259,14 @@ def line_posteriors(
 
 
 @_jit
-def add_points(
-    count, normal_rate, point, link, kept, mean, variance, twists, half, step, least_sigma, clip, A, b
-):
+def add_points(points, count, crossings, twists, half, step, least_sigma, clip, A, b):
     """Add the contour points to the normal equations `A` (M, M) and `b` (M,) under Tukey's weight.
 
     The first six unknowns are a left perturbation [phi rad, rho m] of the camera; `twists` (M - 6, L, 6) are those of
     the links by the others. Returns the weighted squares and the number of points that had a say.
     """
+    _, normal_rate, _, kept, mean, variance = points
+    point, link = crossings.point, crossings.link
     unknowns = len(b)
     row = np.empty(unknowns)
     flat = ((2 * half + 1) * step) ** 2 / 12
