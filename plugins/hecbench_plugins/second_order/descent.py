@@ -13,12 +13,11 @@ import numpy as np
 from hecbench import se3
 from hecbench.se3 import Array
 from hecbench.system import threads
+from hecbench_plugins.second_order.settings import DESCENT
 from hecbench_plugins.views.pyramid import Level, View
 
 NormalEquations = tuple[float, Array, Array]
 """Cost, J'WJ (6, 6) and -J'Wr (6,)."""
-
-SMALL_STEP = 2e-6
 
 
 @dataclass
@@ -67,10 +66,10 @@ def descend(
     iterations: int,
     trace: Trace,
     stage: str,
-    small: float = SMALL_STEP,
+    small: float = DESCENT.small_step,
 ) -> Descent:
     """Levenberg-Marquardt with Marquardt's scaling; a step that does not lower the cost is taken back."""
-    damping, pose = 1e-3, start
+    damping, pose = DESCENT.first_damping, start
     cost, A, b = step(pose)
     if not np.isfinite(cost):
         return Descent(pose, cost, A, "stalled")
@@ -78,20 +77,20 @@ def descend(
         trace.iterations += 1
         move = np.linalg.solve(A + np.diag(damping * np.diag(A) + 1e-9 * np.trace(A) / 6 + 1e-12), b)
         size = float(np.linalg.norm(move))
-        if size > 0.5:
-            move *= 0.5 / size
+        if size > DESCENT.longest_step:
+            move *= DESCENT.longest_step / size
         proposed = se3.exp(move) @ pose
         new_cost, new_A, new_b = step(proposed)
         if new_cost < cost:
             pose, cost, A, b = proposed, new_cost, new_A, new_b
-            damping = max(0.2 * damping, 1e-7)
+            damping = max(DESCENT.relaxed * damping, DESCENT.least_damping)
             trace.poses.append((stage, pose.copy(), cost))
             if np.abs(move).max() < small:
                 return Descent(pose, cost, A, "converged")
         else:
             if np.abs(move).max() < 10 * small:
                 return Descent(pose, cost, A, "converged")
-            damping *= 10
-            if damping > 1e4:
+            damping *= DESCENT.tightened
+            if damping > DESCENT.most_damping:
                 return Descent(pose, cost, A, "stalled")
     return Descent(pose, cost, A, "iterations")

@@ -14,19 +14,11 @@ from hecbench.estimate import Estimate, Termination
 from hecbench.se3 import Array
 from hecbench_plugins.second_order.descent import Descent, Trace, draw_counted
 from hecbench_plugins.second_order.photometry import Photometry
+from hecbench_plugins.second_order.settings import EVIDENCE
 from hecbench_plugins.second_order.silhouette import contour_rows, distances_at, outer
 from hecbench_plugins.views.common_error import Middle, common_error
 from hecbench_plugins.views.pyramid import View
 
-_BLIND = 1e-12
-_PATH_STEPS = 40
-_NEAR_PX = 2.0
-_ROUGHNESS = 1.16
-"""Error over the sigma of the bare information: a sampled picture moves less smoothly than its derivative says.
-
-Measured on scenes of `synthetic` with noise 0.05 and no mask, 300 of LP with seed 31 (1.18), 150 of HP with seed 32
-(1.12) and 100 of MP with seed 11 (1.08); not derived.
-"""
 _HALF_TURN = np.diag([-1.0, -1.0, 1.0, 1.0])
 """About the root link's vertical axis: from there a symmetric arm looks much the same."""
 
@@ -56,12 +48,12 @@ def overlap(views: Sequence[View], pose: Array, trace: Trace) -> float:
 
 
 def contour_found(views: Sequence[View], pose: Array, trace: Trace) -> float:
-    """The least share among the views of the drawn contour within `_NEAR_PX` of the mask's, at full size."""
+    """The least share among the views of the drawn contour within `EVIDENCE.near_px` of the mask's, at full size."""
     shares = []
     for view, distance in zip(views, distances_at(views, 1), strict=True):
         at = draw_counted(view, 1, pose, trace)
         off, _ = contour_rows(at.renderer.crossings, outer(at), distance)
-        shares.append(float((np.abs(off) < _NEAR_PX).sum() / max(len(off), 1)))
+        shares.append(float((np.abs(off) < EVIDENCE.near_px).sum() / max(len(off), 1)))
     return min(shares)
 
 
@@ -87,11 +79,11 @@ def to_estimate(
         "condition": float(values[-1] / values[0]),
     }
     seen_from_camera: NDArray[np.floating] | None = end.covariance
-    if seen_from_camera is None and values[0] > _BLIND * values[-1]:
+    if seen_from_camera is None and values[0] > EVIDENCE.blind * values[-1]:
         inverse = np.linalg.inv(information)
         if end.kind == "colour":
             inverse += inverse @ end.photometry.colour_information() @ inverse
-        seen_from_camera = (_ROUGHNESS * noise) ** 2 * inverse + _disagreement(end)
+        seen_from_camera = (EVIDENCE.roughness * noise) ** 2 * inverse + _disagreement(end)
     parent_T_camera = se3.inverse(camera_T_parent)
     covariance = None
     if seen_from_camera is not None:
@@ -121,8 +113,8 @@ def _disagreement(end: FinalStage) -> Array:
 
 
 def path_json(steps: list[tuple[str, Array, float]]) -> list[list[Any]]:
-    """Stage, cost and log of parent_T_camera of at most `_PATH_STEPS` of the steps, the first and last among them."""
-    kept = np.round(np.linspace(0, len(steps) - 1, min(_PATH_STEPS, len(steps)))).astype(int)
+    """Stage, cost and log of parent_T_camera of the steps, thinned to `EVIDENCE.path_steps`, first and last kept."""
+    kept = np.round(np.linspace(0, len(steps) - 1, min(EVIDENCE.path_steps, len(steps)))).astype(int)
     return [
         [stage, None if np.isnan(cost) else round(cost, 6), se3.log(se3.inverse(pose)).round(6).tolist()]
         for stage, pose, cost in (steps[i] for i in kept)

@@ -6,20 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench_plugins.second_order.photometry import Photometry
-
-_APART_PX = 3
-"""Noise of neighbours that demosaicing and compression have mixed is independent at this distance."""
-_SURE = 3.0
-"""Standard errors by which shading must exceed what noise alone would show."""
-MOST_UNEVEN = 0.005
-"""Of [0, 1]: a good step of 8-bit pictures. Flat drawings with noise of 0.05 stay below it, a lit arm has 0.05."""
+from hecbench_plugins.second_order.settings import STAGES
 
 
 def unevenness(photometry: Photometry) -> float:
     """Standard deviation, in [0, 1], of what is left of shading in parts or background at the pictures drawn last.
 
     Residuals inside a region, away from every edge, are noise where the region is flat; what they share with those
-    `_APART_PX` beside them is shading, texture or mottling. The largest value over views and both regions.
+    `STAGES.uneven_apart_px` beside them is shading, texture or mottling. The largest value over views and both regions.
     """
     worst = 0.0
     for view, residual in zip(photometry.views, photometry.residuals, strict=True):
@@ -39,7 +33,7 @@ def _inner(part: NDArray[np.int32]) -> NDArray[np.bool_]:
     """Pixels (h, w) in whose neighbourhood only one part is drawn."""
     from scipy import ndimage
 
-    width = 2 * _APART_PX + 1
+    width = 2 * STAGES.uneven_apart_px + 1
     return np.asarray(ndimage.maximum_filter(part, width) == ndimage.minimum_filter(part, width))
 
 
@@ -50,12 +44,17 @@ def _shared(residual: NDArray[np.float32], region: NDArray[np.bool_]) -> float:
     centred = residual - residual[region].mean(0)
     worst = 0.0
     for one, other in (
-        ((slice(None), slice(_APART_PX, None)), (slice(None), slice(None, -_APART_PX))),
-        ((slice(_APART_PX, None),), (slice(None, -_APART_PX),)),
+        (
+            (slice(None), slice(STAGES.uneven_apart_px, None)),
+            (slice(None), slice(None, -STAGES.uneven_apart_px)),
+        ),
+        ((slice(STAGES.uneven_apart_px, None),), (slice(None, -STAGES.uneven_apart_px),)),
     ):
         both = region[one] & region[other]
         if not both.any():
             continue
         products = (centred[one] * centred[other])[both].mean(-1)
-        worst = max(worst, float(products.mean() - _SURE * products.std() / np.sqrt(len(products))))
+        worst = max(
+            worst, float(products.mean() - STAGES.uneven_sure * products.std() / np.sqrt(len(products)))
+        )
     return worst

@@ -9,13 +9,10 @@ import numpy as np
 from hecbench import se3
 from hecbench.se3 import Array
 from hecbench_plugins.second_order import kernels
-from hecbench_plugins.second_order.descent import SMALL_STEP, Trace, draw_counted
+from hecbench_plugins.second_order.descent import Trace, draw_counted
 from hecbench_plugins.second_order.photometry import Photometry
+from hecbench_plugins.second_order.settings import DESCENT, STAGES
 from hecbench_plugins.views.pyramid import Level, View
-
-_MASK_REACH_PX = 2
-_VIOLATION_CLIP_PX = 0.1
-_COVERAGE_WEIGHT = 0.02
 
 
 def between_pixels(
@@ -30,11 +27,11 @@ def between_pixels(
     pose, share = start, 1.0
     for _ in range(rounds):
         _, A, b = photometry(pose)
-        A, b = _COVERAGE_WEIGHT * A, _COVERAGE_WEIGHT * b
+        A, b = STAGES.coverage_weight * A, STAGES.coverage_weight * b
         violated = total = 0
         for view in views:
             residual, rows = _violations(view.levels[1])
-            kernels.row_weights(rows[residual != 0], residual[residual != 0], _VIOLATION_CLIP_PX, A, b)
+            kernels.row_weights(rows[residual != 0], residual[residual != 0], STAGES.violation_clip_px, A, b)
             violated += int((residual != 0).sum())
             total += len(residual)
         share = violated / max(total, 1)
@@ -42,7 +39,7 @@ def between_pixels(
         pose = se3.exp(move) @ pose
         trace.iterations += 1
         trace.poses.append(("intervals/1", pose.copy(), share))
-        if np.abs(move).max() < SMALL_STEP:
+        if np.abs(move).max() < DESCENT.small_step:
             break
     return pose, share
 
@@ -59,11 +56,11 @@ def _violations(at: Level) -> tuple[Array, Array]:
     height, width = at.observed.shape[:2]
     p = crossings.pixels[:, 0]
     y, x = p // width, p % width
-    reach = _MASK_REACH_PX + 1
+    reach = STAGES.mask_reach_px + 1
     inside = (x >= reach) & (x < width - reach - 1) & (y >= reach) & (y < height - reach - 1)
     inside &= ~at.unseen(crossings.pixels)
     chosen = np.flatnonzero(inside & (crossings.parts < 0).any(1) & (np.abs(crossings.slope) <= 1))
-    steps = np.arange(-_MASK_REACH_PX, _MASK_REACH_PX + 1)
+    steps = np.arange(-STAGES.mask_reach_px, STAGES.mask_reach_px + 1)
     stride = crossings.pixels[chosen, 1] - p[chosen]
     place = p[chosen, None] + stride[:, None] * steps
     mask = at.observed[..., 3].reshape(-1) > 0.5

@@ -13,14 +13,8 @@ from hecbench.rendering import Crossings
 from hecbench.se3 import Array
 from hecbench_plugins.second_order import kernels
 from hecbench_plugins.second_order.descent import NormalEquations, Trace, draw_all, draw_uncounted
-from hecbench_plugins.second_order.silhouette import FEWEST_CROSSINGS
+from hecbench_plugins.second_order.settings import STAGES
 from hecbench_plugins.views.pyramid import Level, View
-
-_FEWEST_PURE = 10
-_FEWEST_PARTS = 4
-_ANY_COLOUR = 10.0
-_DARKEST = 0.02
-_TONE_MISFIT = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,10 +65,10 @@ class Photometry:
         sums, counts = np.zeros_like(nominal), np.zeros_like(nominal)
         margin = 1 + int(np.ceil(2 * self.blur_px))
         for _ in range(3 if known is None else 1):
-            width = _ANY_COLOUR if known is None else max(self.huber, 0.05)
+            width = STAGES.any_colour if known is None else max(self.huber, 0.05)
             current = nominal if known is None else known.table.astype(float)
             kernels.part_colours(part, at.observed, box, current, width, margin, sums, counts)
-            seen = counts > _FEWEST_PURE
+            seen = counts > STAGES.fewest_pure
             table = np.where(seen, sums / np.maximum(counts, 1), _follow(nominal, sums, counts, seen))
             known = PartColours(table.astype(np.float32), np.asarray(seen.all(1)), counts.copy())
         self.fitted[index] = known
@@ -89,7 +83,7 @@ class Photometry:
         for index, (view, at) in enumerate(zip(self.views, levels, strict=True)):
             crossed += len(at.renderer.crossings)
             cost += self._add(index, at, self.columns(view, at.renderer.crossings, pose), A, b)
-        return (cost if crossed >= FEWEST_CROSSINGS else np.inf), A, b
+        return (cost if crossed >= STAGES.fewest_crossings else np.inf), A, b
 
     def draw(self, view: View, pose: Array) -> Level:
         """Draw one view."""
@@ -226,12 +220,12 @@ def tone_exponent(photometry: Photometry) -> float:
             nominal.append(table[seen])
             found.append(colours.table[seen])
     x, y = np.concatenate(nominal), np.concatenate(found)
-    use = (x > _DARKEST) & (y > _DARKEST)
-    if use.sum() < 3 * _FEWEST_PARTS or np.ptp(np.log(x[use])) < 0.5:
+    use = (x > STAGES.darkest) & (y > STAGES.darkest)
+    if use.sum() < 3 * STAGES.fewest_parts or np.ptp(np.log(x[use])) < 0.5:
         return 1.0
     exponent, gain = np.polyfit(np.log(x[use]), np.log(y[use]), 1)
     misfit = np.std(np.log(y[use]) - exponent * np.log(x[use]) - gain)
-    trusted = misfit < _TONE_MISFIT and abs(exponent - 1) > _TONE_MISFIT
+    trusted = misfit < STAGES.tone_misfit and abs(exponent - 1) > STAGES.tone_misfit
     return float(exponent) if trusted else 1.0
 
 

@@ -21,9 +21,10 @@ from hecbench.robots.posed import PosedRobot
 from hecbench.se3 import Array
 from hecbench_plugins.second_order import evidence
 from hecbench_plugins.second_order.descent import Trace, descend, draw_counted
-from hecbench_plugins.second_order.flatness import MOST_UNEVEN, unevenness
+from hecbench_plugins.second_order.flatness import unevenness
 from hecbench_plugins.second_order.mask_intervals import between_pixels, violated_share
 from hecbench_plugins.second_order.photometry import Photometry, tone_exponent
+from hecbench_plugins.second_order.settings import STAGES
 from hecbench_plugins.second_order.silhouette import centroid_and_area, distances_at, silhouette_step
 from hecbench_plugins.second_order.unknowns import ExtendedPhotometry, Unknown, solve
 from hecbench_plugins.views.pyramid import RaggedMasks, View, linearised, prepare
@@ -33,10 +34,6 @@ _TERMINATIONS = {
     "stalled": Termination.STALLED,
     "iterations": Termination.MAX_ITERATIONS,
 }
-_MOST_ROUNDS = 40
-"""Of a descent at full size; nearly all converge in a dozen."""
-_BLURS_PX = (0.5, 0.75, 1.0, 1.25, 1.5, 2.0)
-_RESTART_TURNS_DEG = ((0, 0, 0), (0, 0, 25), (0, 0, -25), (0, 20, 0), (0, -20, 0), (20, 0, 0), (-20, 0, 0))
 
 
 @dataclass(frozen=True)
@@ -135,11 +132,11 @@ class RenderGN:
     def _align(self, views: list[View], start: Array, trace: Trace) -> Array:
         """The best of silhouette alignments from turned starts; the first good one ends the search."""
         best, best_overlap = start, -1.0
-        for turn in _RESTART_TURNS_DEG:
+        for turn in STAGES.restart_turns_deg:
             pose = start.copy()
             pose[:3, :3] = se3.so3_exp(np.deg2rad(turn)) @ start[:3, :3]
             pose = centroid_and_area(views, pose, trace)
-            for level, clip, rounds in ((4, 15.0, 25), (2, 6.0, 12)):
+            for level, clip, rounds in STAGES.silhouette:
                 step = silhouette_step(views, level, distances_at(views, level), clip, trace)
                 pose = descend(step, pose, rounds, trace, f"silhouette/{level}", small=1e-4).pose
             overlap = evidence.overlap(views, pose, trace)
@@ -159,7 +156,7 @@ class RenderGN:
             return self._by_masks(views, pose, trace)
         colour = self._by_colours(views, pose, trace)
         colour.photometry(colour.descent.pose)
-        flat = unevenness(colour.photometry) <= MOST_UNEVEN
+        flat = unevenness(colour.photometry) <= STAGES.most_uneven
         if not any(view.has_mask for view in views):
             if flat:
                 return colour
@@ -176,7 +173,7 @@ class RenderGN:
 
     def _by_colours(self, views: list[View], pose: Array, trace: Trace) -> evidence.FinalStage:
         """One flat colour per part, coarse to fine, then the pictures' tone curve and blur."""
-        for level, rounds in ((4, 8), (2, 8), (1, _MOST_ROUNDS)):
+        for level, rounds in STAGES.colour:
             photometry = Photometry(views, level, slice(0, 3), self.huber, trace)
             descent = descend(photometry, pose, rounds, trace, f"colour/{level}")
             pose = descent.pose
@@ -184,20 +181,20 @@ class RenderGN:
         if exponent != 1.0:
             views = [linearised(view, exponent) for view in views]
             photometry = Photometry(views, 1, slice(0, 3), self.huber, trace)
-            descent = descend(photometry, pose, _MOST_ROUNDS, trace, f"tone {exponent:.2f}/1")
+            descent = descend(photometry, pose, STAGES.most_rounds, trace, f"tone {exponent:.2f}/1")
             pose = descent.pose
-        for blur in _BLURS_PX:
+        for blur in STAGES.blurs_px:
             blurred = Photometry(views, 1, slice(0, 3), self.huber, trace, blur_px=blur)
             if blurred(pose)[0] > descent.cost:
                 break
-            descent = descend(blurred, pose, _MOST_ROUNDS, trace, f"blur {blur}/1")
+            descent = descend(blurred, pose, STAGES.most_rounds, trace, f"blur {blur}/1")
             pose, photometry = descent.pose, blurred
         return evidence.FinalStage("colour", descent, photometry)
 
     def _by_masks(self, views: list[View], pose: Array, trace: Trace) -> evidence.FinalStage:
         """Coverage, then the intervals between pixel centres unless the mask is not one of sampled pixels."""
         coverage = Photometry(views, 1, slice(3, 4), self.huber, trace)
-        descent = descend(coverage, pose, _MOST_ROUNDS, trace, "coverage/1")
+        descent = descend(coverage, pose, STAGES.most_rounds, trace, "coverage/1")
         pose, violated = between_pixels(views, coverage, descent.pose, trace)
         if violated > self.most_violated:
             return evidence.FinalStage("coverage", descent, coverage)

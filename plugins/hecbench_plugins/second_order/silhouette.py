@@ -17,9 +17,8 @@ from hecbench_plugins.second_order.descent import (
     draw_counted,
     draw_uncounted,
 )
+from hecbench_plugins.second_order.settings import STAGES
 from hecbench_plugins.views.pyramid import Level, View, signed_distance
-
-FEWEST_CROSSINGS = 30
 
 
 def centroid_and_area(views: Sequence[View], start: Array, trace: Trace, rounds: int = 6) -> Array:
@@ -71,7 +70,7 @@ def silhouette_step(
             residual, jacobian = contour_rows(at.renderer.crossings, outer(at), distance)
             cost += kernels.row_weights(jacobian, residual, clip, A, b)
             count += len(residual)
-        if count < FEWEST_CROSSINGS:
+        if count < STAGES.fewest_crossings:
             return np.inf, A, b
         return cost / count, A, b
 

@@ -15,10 +15,8 @@ from hecbench.robots.posed import PosedRobot
 from hecbench.se3 import Array
 from hecbench_plugins.second_order.descent import Descent, NormalEquations
 from hecbench_plugins.second_order.photometry import Photometry
+from hecbench_plugins.second_order.settings import DESCENT, EVIDENCE
 from hecbench_plugins.views.pyramid import Level, View
-
-_UNSEEN = 0.8
-"""Share of the prior's standard deviation that must be left for an unknown to count as not observable."""
 
 
 class Unknown(StrEnum):
@@ -29,7 +27,7 @@ class Unknown(StrEnum):
     FOCAL = "focal"
 
 
-PRIOR = {Unknown.JOINTS: np.deg2rad(0.5), Unknown.SCALE: 0.02, Unknown.FOCAL: 0.02}
+PRIOR = {Unknown.JOINTS: EVIDENCE.joints_rad, Unknown.SCALE: EVIDENCE.scale, Unknown.FOCAL: EVIDENCE.focal}
 """Standard deviations about 0: rad, and relative."""
 
 
@@ -120,7 +118,7 @@ class Solved:
 def solve(photometry: ExtendedPhotometry, start: Array, noise: float, rounds: int = 30) -> Solved:
     """Levenberg-Marquardt over the pose and the other unknowns, the priors weighed by the pictures' noise."""
     prior = np.r_[np.zeros(6), (noise / photometry.sigmas) ** 2]
-    pose, values, damping, ended = start, photometry.values.copy(), 1e-3, "iterations"
+    pose, values, damping, ended = start, photometry.values.copy(), DESCENT.first_damping, "iterations"
 
     def evaluate(pose: Array, values: Array) -> NormalEquations:
         photometry.values = values
@@ -137,12 +135,12 @@ def solve(photometry: ExtendedPhotometry, start: Array, noise: float, rounds: in
         better = new[0] < cost
         if better:
             (pose, values), (cost, A, b) = moved, new
-            damping = max(0.2 * damping, 1e-9)
-        if np.abs(move).max() < (2e-6 if better else 2e-5):
+            damping = max(DESCENT.relaxed * damping, 1e-9)
+        if np.abs(move).max() < DESCENT.small_step * (1 if better else 10):
             ended = "converged"
             break
         if not better:
-            damping *= 10
+            damping *= DESCENT.tightened
     _, A, _ = evaluate(pose, values)
     size = 1 / np.sqrt(np.diag(A))
     covariance = noise**2 * np.linalg.inv(A * np.outer(size, size)) * np.outer(size, size)
@@ -158,6 +156,10 @@ def solve(photometry: ExtendedPhotometry, start: Array, noise: float, rounds: in
 def details(names: Sequence[str], values: Array, sigmas: Array, prior_sigmas: Array) -> dict[str, Any]:
     """What was found for each unknown, and whether the pictures said anything about it beside the prior."""
     return {
-        name: {"value": float(value), "sigma": float(sigma), "observable": bool(sigma < _UNSEEN * prior)}
+        name: {
+            "value": float(value),
+            "sigma": float(sigma),
+            "observable": bool(sigma < EVIDENCE.unseen * prior),
+        }
         for name, value, sigma, prior in zip(names, values, sigmas, prior_sigmas, strict=True)
     }

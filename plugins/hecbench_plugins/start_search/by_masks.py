@@ -25,6 +25,7 @@ from hecbench_plugins.second_order.descent import Trace, descend
 from hecbench_plugins.second_order.render_gn import RenderGN
 from hecbench_plugins.second_order.silhouette import silhouette_step
 from hecbench_plugins.start_search.kernels import moments, shared_pixels
+from hecbench_plugins.start_search.settings import MASKS
 from hecbench_plugins.start_search.view_sphere import ViewSphere, alike, best_apart, look_at
 from hecbench_plugins.views.pyramid import (
     Level,
@@ -36,26 +37,17 @@ from hecbench_plugins.views.pyramid import (
     signed_distance,
 )
 
-_SEARCH_PX, _SMALLEST = 80, 8
-"""Longer side of a mask at the size of the search, and the most pixels of the recording in one there."""
 _SIZE = 0
-"""The key of that size among a view's levels."""
-_SCANNED_VIEWS, _REFINED_VIEWS = 2, 5
-_PLACING_ROUNDS = 3
-_CLIP_PX, _SMALL_STEP = 8.0, 1e-3
-_ROUNDS = ((24, 12), (12, 12))
-_FIRST_ROUND = (150, 6)
-"""How many of the best are refined, and in how many steps, round by round; the first by the scanned views alone."""
-_FEWEST_PIXELS = 8
+"""The key of the search's size among a view's levels."""
 
 
 @lru_cache(maxsize=4)
 def _search_mesh(model: RobotModel) -> tuple[RenderMesh, float]:
-    """A coarse mesh and the robot's extent, m: cells of one pixel where the robot is `_SEARCH_PX` large."""
+    """A coarse mesh and the robot's extent, m: cells of one pixel where the robot is `MASKS.search_px` large."""
     meshes = meshes_by_level(model)
     joints = np.clip(np.zeros(len(model.joint_names)), *model.limits().T)
     extent_m = float(np.ptp(_vertices(meshes[4], model.link_poses(joints)), axis=0).max())
-    return RenderMesh.of(model, cell_m=extent_m / _SEARCH_PX), extent_m
+    return RenderMesh.of(model, cell_m=extent_m / MASKS.search_px), extent_m
 
 
 def _vertices(mesh: RenderMesh, frame_T_link: Array) -> Array:
@@ -93,12 +85,12 @@ class MaskScore:
     def placed(self, camera_T_parent: Array) -> Array:
         """The pose moved until centroid and area of the drawn robot match the masks; its rotation stays."""
         pose = camera_T_parent.copy()
-        for _ in range(_PLACING_ROUNDS):
+        for _ in range(MASKS.placing_rounds):
             moves = []
             for view, ray, area in zip(self.views, self.rays, self._areas, strict=True):
                 renderer = self._rasterised(view, pose)
                 drawn, x, y, near = moments(renderer.face, renderer.nearness, renderer.box)
-                if drawn >= _FEWEST_PIXELS:
+                if drawn >= MASKS.fewest_pixels:
                     ratio = np.clip(np.sqrt(drawn / area), 0.5, 2.0)
                     moves.append((ray * ratio - _ray(renderer, x, y)) / near)
             if not moves:
@@ -114,15 +106,15 @@ class MaskScore:
 
     def refined(self, camera_T_parent: Array, iterations: int) -> Array:
         """Some Gauss-Newton steps of the drawn contour towards the masks' contours."""
-        step = silhouette_step(self.views, _SIZE, self._distances, _CLIP_PX, self.trace)
-        return descend(step, camera_T_parent, iterations, self.trace, "search", small=_SMALL_STEP).pose
+        step = silhouette_step(self.views, _SIZE, self._distances, MASKS.clip_px, self.trace)
+        return descend(step, camera_T_parent, iterations, self.trace, "search", small=MASKS.small_step).pose
 
 
 def _small(view: View, mesh: RenderMesh) -> View:
     """The view at the size of the search alone."""
     full = view.levels[1]
     rows, columns = np.nonzero(full.observed[..., 3] > 0.5)
-    size = int(np.clip(round(max(np.ptp(rows), np.ptp(columns)) / _SEARCH_PX), 1, _SMALLEST))
+    size = int(np.clip(round(max(np.ptp(rows), np.ptp(columns)) / MASKS.search_px), 1, MASKS.smallest))
     observed = shrink(full.observed, size)
     K = shrunk_intrinsics(np.asarray(full.renderer.K, float), 1 / size)
     renderer = Renderer(mesh, K, observed.shape[1], observed.shape[0])
@@ -155,7 +147,7 @@ def starts(model: RobotModel, views: Sequence[View], sphere: ViewSphere, trace: 
     """
     mesh, extent_m = _search_mesh(model)
     order = np.argsort([-float(view.levels[4].observed[..., 3].sum()) for view in views], kind="stable")
-    scan = MaskScore([views[i] for i in order[:_SCANNED_VIEWS]], mesh, trace)
+    scan = MaskScore([views[i] for i in order[: MASKS.scanned_views]], mesh, trace)
     root_T_link = se3.inverse(scan.views[0].parent_T_link[0]) @ scan.views[0].parent_T_link
     points_m = _vertices(mesh, root_T_link)
     middle_m = (points_m.min(0) + points_m.max(0)) / 2
@@ -163,8 +155,8 @@ def starts(model: RobotModel, views: Sequence[View], sphere: ViewSphere, trace: 
     looks = look_at(sphere.rotations(), middle_m, scan.rays[0], 2 * extent_m) @ root_T_parent
     poses = [scan.placed(look) for look in looks]
     scores = [scan(pose) for pose in poses]
-    fine = MaskScore([views[i] for i in order[:_REFINED_VIEWS]], mesh, trace)
-    for score, (count, iterations) in ((scan, _FIRST_ROUND), *((fine, later) for later in _ROUNDS)):
+    fine = MaskScore([views[i] for i in order[: MASKS.refined_views]], mesh, trace)
+    for score, (count, iterations) in ((scan, MASKS.first_round), *((fine, later) for later in MASKS.rounds)):
         kept = best_apart(poses, scores, count)
         poses = [score.refined(poses[i], iterations) for i in kept]
         scores = [score(pose) for pose in poses]

@@ -18,18 +18,8 @@ from hecbench.rendering.undistort import shrunk_intrinsics
 from hecbench.se3 import Array
 from hecbench.system import threads
 from hecbench_plugins.start_search.kernels import coverage
+from hecbench_plugins.start_search.settings import PHOTOGRAPHS
 from hecbench_plugins.start_search.view_sphere import ViewSphere, best_apart, look_at
-
-_DISTANCES = (1.2, 1.6, 2.1, 2.8, 3.7, 4.9)
-"""Of the camera, in spans of the moving links."""
-_COARSE_PX, _WIDTH_PX = 40, 80
-"""Width of the drawings: of all poses, then of the better ones."""
-_BETTER = 0.05
-"""Share of the poses that the coarse drawings leave. On 16 sets of 5 to 40 photographs, real and rendered, the six best
-starts of the fine drawings were all among the first 0.008."""
-_VIEWS = 5
-_UNCHANGED_COST = 0.7
-_APART = 0.2
 
 
 def starts(
@@ -56,16 +46,16 @@ def starts(
     """
     middle, span = _moving(parent_T_link)
     if distances_m is None:
-        distances_m = [factor * span for factor in _DISTANCES]
+        distances_m = [factor * span for factor in PHOTOGRAPHS.distances]
     centre = np.array([0.0, 0.0, 1.0])
     rotations = sphere.rotations()
     poses = np.concatenate([look_at(rotations, middle, centre, distance) for distance in distances_m])
-    views = np.unique(np.linspace(0, len(parent_T_link) - 1, _VIEWS).round().astype(int))
+    views = np.unique(np.linspace(0, len(parent_T_link) - 1, PHOTOGRAPHS.views).round().astype(int))
     seen = K, valid, parent_T_link[views], foreground[views]
-    _, costs = _shifted(mesh, seen, poses, _COARSE_PX)
-    better = np.sort(costs.argsort(kind="stable")[: max(count, round(_BETTER * len(poses)))])
-    found, costs = _shifted(mesh, seen, poses[better], _WIDTH_PX)
-    return [found[i] for i in best_apart(list(found), list(-costs), count, _APART)]
+    _, costs = _shifted(mesh, seen, poses, PHOTOGRAPHS.coarse_px)
+    better = np.sort(costs.argsort(kind="stable")[: max(count, round(PHOTOGRAPHS.better * len(poses)))])
+    found, costs = _shifted(mesh, seen, poses[better], PHOTOGRAPHS.width_px)
+    return [found[i] for i in best_apart(list(found), list(-costs), count, PHOTOGRAPHS.apart)]
 
 
 def _shifted(
@@ -113,7 +103,7 @@ class _Shifts:
         gain = np.zeros((len(parent_T_link), *self._size), np.float32)
         for view, changed in enumerate(foreground):
             small = cv2.resize(changed, (width, height), interpolation=cv2.INTER_AREA)
-            gain[view, :height, :width] = _UNCHANGED_COST * (1 - small) - small
+            gain[view, :height, :width] = PHOTOGRAPHS.unchanged_cost * (1 - small) - small
         inside = cv2.resize(valid.astype(np.float32), (width, height), interpolation=cv2.INTER_AREA)
         gain[:, :height, :width] *= inside > 0.9
         self._gain = np.fft.rfft2(gain)

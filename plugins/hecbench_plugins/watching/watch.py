@@ -2,10 +2,10 @@
 
 Each frame gives the normal equations of the contour about the camera's known pose (`maskless.contour`), with a column
 for every joint. The first frames give a reference: the camera's pose, the joints' constant offsets and the usual
-misfit. Afterwards the frames of a short window are added up, the joints are eliminated within what the first frames left open,
-and the camera's offset is standardised. The sum of its squares is a test for a jump with the shortest delay (after
-Willsky and Jones 1976, "A generalized likelihood ratio approach to the detection and estimation of jumps in linear
-systems"). A hidden robot confirms less of its contour: then nothing is concluded.
+misfit. Afterwards the frames of a short window are added up, the joints are eliminated within what the first frames
+left open, and the camera's offset is standardised. The sum of its squares is a test for a jump with the shortest
+delay (after Willsky and Jones 1976, "A generalized likelihood ratio approach to the detection and estimation of jumps
+in linear systems"). A hidden robot confirms less of its contour: then nothing is concluded.
 """
 
 from __future__ import annotations

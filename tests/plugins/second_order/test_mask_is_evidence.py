@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from hecbench_datasets.suites import synthetic
 from hecbench_plugins.second_order.descent import Trace
-from hecbench_plugins.second_order.flatness import MOST_UNEVEN, unevenness
+from hecbench_plugins.second_order.flatness import unevenness
 from hecbench_plugins.second_order.photometry import Photometry
+from hecbench_plugins.second_order.settings import STAGES
 from hecbench_plugins.solvers.render_gn import render_gn
 from hecbench_plugins.views.pyramid import prepare
 from scipy import ndimage
@@ -70,4 +71,4 @@ def test_shading_is_measured_against_noise(change, flat):
     _, views = prepare(_shaded(recording, change))
     photometry = Photometry(views, 1, slice(0, 3), 0.3, Trace())
     photometry(se3.inverse(recording.truth_parent_T_camera))
-    assert (unevenness(photometry) <= MOST_UNEVEN) == flat
+    assert (unevenness(photometry) <= STAGES.most_uneven) == flat
