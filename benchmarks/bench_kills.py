@@ -26,10 +26,10 @@ import click
 import msgspec
 import numpy as np
 import psutil
+from bench_robot_unattended import cell
 
 from hecbench import conformance
-from hecbench.recording import Mounting, Recording, RobotDescription
-from hecbench.robots.model import load_robot
+from hecbench.recording import Mounting
 from hecbench.storage import journal, recording_io, store, trial_record
 
 SIGNALS = (signal.SIGKILL, signal.SIGTERM, signal.SIGINT)
@@ -86,16 +86,7 @@ def train_results(out: Path) -> object:
 
 
 def verbs(scratch: Path) -> dict[str, Verb]:
-    joints = np.array([0.3, -1.4, 1.5, -1.6, -1.5, 0.2]) + 0.3 * np.eye(6)[:5]
-    plan = Recording(
-        name="cell",
-        mounting=Mounting.EYE_IN_HAND,
-        sample_ids=tuple("abcde"),
-        robot=RobotDescription(model="ur5e"),
-        joints_rad=joints,
-        base_T_flange=load_robot("ur5e").forward(joints, base="base", tip="tool0"),
-    )
-    recording_io.save(plan, scratch / "cell")
+    cell(scratch / "cell")
     rig = conformance.rig(np.random.default_rng(1), Mounting.EYE_TO_HAND, noise=1e-4)
     recording_io.save(rig, scratch / "rig")
     return {

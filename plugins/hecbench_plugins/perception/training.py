@@ -10,7 +10,6 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-import cv2
 import numpy as np
 import torch
 from torch import Tensor
@@ -25,6 +24,7 @@ from hecbench_plugins.perception.network import PerceptionNet
 from hecbench_plugins.perception.pictures import PictureMaker
 from hecbench_plugins.perception.plan import STRIDE, Plan
 from hecbench_plugins.perception.pool import Pool
+from hecbench_plugins.perception.processor import prepared
 
 CHECKPOINT = "checkpoint.safetensors"
 
@@ -44,11 +44,8 @@ class Training:
 
     def __init__(self, plan: Plan, say: Callable[[str], None]) -> None:
         self.plan, self.say = plan, say
-        torch.set_num_threads(plan.threads)
-        cv2.setNumThreads(plan.threads)
-        torch.manual_seed(plan.seed)
+        self.device = prepared(plan.threads, plan.seed)
         self.family = Family.of(plan.robots)
-        self.device = "cuda" if torch.cuda.is_available() else "cpu"
         self.net = PerceptionNet(len(self.family.palette), self.family.keypoint_count)
         self.progress = Progress(self.family.names, plan.seed)
         tensors = self._start()

@@ -8,7 +8,6 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-import cv2
 import numpy as np
 import torch
 from torch import Tensor
@@ -19,6 +18,7 @@ from hecbench_plugins.perception import checkpoint
 from hecbench_plugins.perception.checkpoint import Progress
 from hecbench_plugins.perception.family import Family
 from hecbench_plugins.perception.onnx_export import graph_of
+from hecbench_plugins.perception.processor import prepared
 from hecbench_plugins.translation.model import CARD, FORMAT, WEIGHTS
 from hecbench_plugins.translation.networks import networks_of
 from hecbench_plugins.translation.objectives import Pictures, generators_loss, judges_loss
@@ -38,11 +38,8 @@ class Training:
 
     def __init__(self, plan: Plan, say: Callable[[str], None]) -> None:
         self.plan, self.say = plan, say
-        torch.set_num_threads(plan.threads)
-        cv2.setNumThreads(plan.threads)
-        torch.manual_seed(plan.seed)
+        self.device = prepared(plan.threads, plan.seed)
         self.family = Family.of(plan.robots)
-        self.device = "cuda" if torch.cuda.is_available() else "cpu"
         self.nets = networks_of(plan)
         self.progress = Progress((str(plan.method), *self.family.names), plan.seed)
         tensors = self._stored()
