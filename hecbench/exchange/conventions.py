@@ -9,7 +9,7 @@ holds still.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -158,17 +158,22 @@ def prove(
         return _proof(
             fitting[0], f"{source}: {_margin(fitting[0], candidates, still, documented if settled else [])}"
         )
-    return _as_documented(source, candidates, documented if settled else [])
+    return _as_documented(source, candidates, documented if settled else [], (robot, target))
 
 
-def _as_documented(source: str, candidates: Sequence[_Candidate], documented: Sequence[_Candidate]) -> Proof:
+def _as_documented(
+    source: str,
+    candidates: Sequence[_Candidate],
+    documented: Sequence[_Candidate],
+    streams: tuple[Sequence[PoseConvention], Sequence[PoseConvention]],
+) -> Proof:
     """The documented reading, where none holds still; without one an error that names the cause."""
     ranked = sorted(candidates, key=lambda c: c.stillness.relative)
     if documented:
         note = f"{source}: read as documented, {documented[0]}; no reading holds the target still, "
         return _proof(documented[0], note + f"the best is {ranked[0]}: pairs mixed up, or too little motion?")
     raise InputError(
-        f"{source}: no reading holds the target still{_cause(ranked)}; the best are "
+        f"{source}: no reading holds the target still{_cause(ranked, *streams)}; the best are "
         f"{'; '.join(map(str, ranked[:3]))}; check the pairing of robot and target poses, or {_CURE}"
     )
 
@@ -227,16 +232,24 @@ def _margin(
     return note
 
 
-def _cause(ranked: Sequence[_Candidate]) -> str:
-    """What would make the best readings hold still: another unit, or the other handedness."""
+def _cause(
+    ranked: Sequence[_Candidate], robot: Sequence[PoseConvention], target: Sequence[PoseConvention]
+) -> str:
+    """What would make a reading hold still: another unit, or the other handedness."""
+    for what, mirrored in _mirrored(robot):
+        best = min(
+            _candidates(mirrored, _usual(target), list(Mounting), False),
+            key=lambda c: (
+                c.stillness.relative > _CONVINCING,
+                c.deviations,
+                not c.sees_target,
+                c.stillness.relative,
+            ),
+        )
+        if best.stillness.relative < _CONVINCING:
+            return f", but {best.name} does once {what}"
     for candidate in sorted(ranked[:_MOST_EXAMINED], key=lambda c: c.deviations):
         hand, seen = candidate.hand_poses, candidate.target.poses
-        mirrored = hand * np.outer(_MIRROR, _MIRROR)
-        if stillness(mirrored, seen).relative < _CONVINCING:
-            return (
-                f", but {candidate.name} does once the y axis of one of the two is turned round: one is left-handed "
-                "(Unity, Unreal); write it in a right-handed frame"
-            )
         scaled = seen.copy()
         scaled[:, :3, 3] *= (factor := length_factor(hand, seen))
         if factor > 0 and stillness(hand, scaled).relative < _CONVINCING:
@@ -245,6 +258,25 @@ def _cause(ranked: Sequence[_Candidate]) -> str:
                 "unit of one of the two"
             )
     return ""
+
+
+def _mirrored(stream: Sequence[PoseConvention]) -> Iterator[tuple[str, list[PoseConvention]]]:
+    """The usual readings in the other handedness, and what was done to them."""
+    usual = _usual(stream)
+    yield (
+        "the y axis of one of the two is turned round: one is left-handed (Unity, Unreal); write it in a right-handed "
+        "frame",
+        [replace(reading, poses=reading.poses * np.outer(_MIRROR, _MIRROR)) for reading in usual],
+    )
+    for axis, letter in enumerate("xyz"):
+        turned = [reading.poses.copy() for reading in usual]
+        for poses in turned:
+            poses[:, axis, 3] *= -1
+        yield (
+            f"the robot's {letter} has the other sign: its positions are left-handed, its rotations are not; turn "
+            f"{letter} round",
+            [replace(reading, poses=poses) for reading, poses in zip(usual, turned, strict=True)],
+        )
 
 
 def _proof(chosen: _Candidate, note: str) -> Proof:

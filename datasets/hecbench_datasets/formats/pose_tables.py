@@ -7,6 +7,7 @@ by consistency; beside pictures, the target is found in them first. It is tried 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 
 from hecbench.errors import InputError
@@ -15,12 +16,15 @@ from hecbench.registry import hookimpl
 from hecbench.specs import DatasetSpec
 from hecbench_datasets.reading.beside_pictures import load_beside_pictures
 from hecbench_datasets.reading.columns import ROBOT_WORDS, TARGET_WORDS, Columns, Poses
-from hecbench_datasets.reading.hints import hints_for
+from hecbench_datasets.reading.hints import Hints, hints_for
 from hecbench_datasets.reading.nearest import nearest_format
 from hecbench_datasets.reading.pairing import Documented, paired
 from hecbench_datasets.reading.sources import foreign
 from hecbench_datasets.reading.survey import Survey, survey
 from hecbench_datasets.reading.tables import TABLE_SUFFIXES
+
+_FEWEST_BELOW = 5
+"""Poses of each kind by which two streams in one table prove themselves."""
 
 
 def sniff(path: Path) -> bool:
@@ -42,10 +46,28 @@ def load(path: Path) -> Recording:
             target_unit=target.unit,
         )
         return paired(path, robot.numbers, target.numbers, documented, hints, camera=hints.camera_model())
+    if robot is not None and not found.pictures and (both := _one_below_the_other(path, robot, hints)):
+        return both
     stream = _of_robot(found, robot)
     if stream is not None and found.pictures:
         return load_beside_pictures(found, stream, robot, hints, hints_file)
     raise InputError(f"{path}: holds {found.found}; {_missing(found, robot)}")
+
+
+def _one_below_the_other(path: Path, rows: Poses, hints: Hints) -> Recording | None:
+    """The recording of one table that holds the robot's rows and then the target's, where that proves itself."""
+    half, rest = divmod(len(rows.numbers), 2)
+    if rest or half < _FEWEST_BELOW:
+        return None
+    documented = Documented(robot_rotation=rows.rotations or None, target_rotation=rows.rotations or None)
+    try:
+        found = paired(
+            path, rows.numbers[:half], rows.numbers[half:], documented, hints, camera=hints.camera_model()
+        )
+    except InputError:
+        return None
+    note = f"{path}: rows 1 to {half} taken for the robot's, the {half} below them for the target's"
+    return replace(found, notes=(note, *found.notes))
 
 
 def _of_robot(found: Survey, robot: Poses | None) -> Columns | None:

@@ -63,19 +63,31 @@ def _own(place: tuple[Path, str], places: list[tuple[Path, str]]) -> str:
 
 
 def sniff(path: Path) -> bool:
-    """A folder or archive with one robot and one camera stream of eight numbers a row."""
+    """A folder or archive with one robot and one camera stream of eight numbers a row, the first no mere counter."""
     found = _streams(path)
     if found is None:
         return False
+    counters = 0
     for file, name in found:
         try:
             content = zip_bytes(file, name)[:4096].decode("utf-8", "replace") if name else head(file)
         except InputError:
             return False
         rows = [line for line in content.splitlines()[:-1] if line.strip() and not line.startswith("#")]
-        if not rows or len(re.split(r"[\s,;]+", rows[-1].strip())) != 8:
+        words = [re.split(r"[\s,;]+", row.strip()) for row in rows]
+        if not rows or len(words[-1]) != 8:
             return False
-    return True
+        counters += _counted([row[0] for row in words if len(row) == 8])
+    return counters < len(found)
+
+
+def _counted(words: list[str]) -> bool:
+    """Whether the words count the rows from 0 or 1, which is no clock."""
+    try:
+        numbers = [float(word) for word in words]
+    except ValueError:
+        return False
+    return numbers[0] in (0, 1) and numbers == [numbers[0] + i for i in range(len(numbers))]
 
 
 @foreign

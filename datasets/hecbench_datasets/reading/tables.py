@@ -16,10 +16,13 @@ import numpy as np
 from hecbench.errors import InputError
 from hecbench.se3 import Array
 from hecbench.system import files
+from hecbench_datasets.reading.robot_literals import literal_rows
 from hecbench_datasets.reading.sources import IMAGE_SUFFIXES, YAML_SUFFIXES, json_value, text, yaml_value
 
 TABLE_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".xlsx", ".json", *YAML_SUFFIXES, ".npy", ".npz")
 _DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
+_THOUSANDS_COMMA = re.compile(r"[+-]?\d{1,3}([.']\d{3})+,\d+")
+_THOUSANDS_POINT = re.compile(r"[+-]?\d{1,3}([,']\d{3})+\.\d+")
 _LIST = re.compile(r"\s*(?:p|array)?[\[(]+(.*?)[\])]+\s*", re.DOTALL)
 _BARE_LIST = re.compile(r"[\[\]()\d\s.,;eE+-]*[\[\]][\[\]()\d\s.,;eE+-]*")
 _NOTHING = frozenset({"", "nan", "none", "null", "n/a", "-"})
@@ -86,19 +89,27 @@ def _lines(content: str) -> list[list[str]]:
     data = [line for line in lines if line and not line.startswith(("#", "//", "%"))]
     if not data:
         return []
+    if (literals := literal_rows(data)) is not None:
+        return literals
     first = lines.index(data[0])
     header = (
         lines[first - 1].lstrip("#/% ") if first and lines[first - 1].startswith(("#", "//", "%")) else ""
     )
     separator = next((mark for mark in ";\t," if _separates(mark, data)), None)
-    rows = _split(data, separator)
-    if separator != ",":
-        rows = [
-            [cell.replace(",", ".") if _DECIMAL_COMMA.fullmatch(cell) else cell for cell in row]
-            for row in rows
-        ]
+    rows = [[_with_point(cell, separator) for cell in row] for row in _split(data, separator)]
     titles = _split([header], separator)[0] if header else []
     return [titles, *rows] if len(titles) == len(rows[0]) and not any(map(_is_number, titles)) else rows
+
+
+def _with_point(cell: str, separator: str | None) -> str:
+    """A number without signs between its thousands, and with a decimal point; other cells as they are."""
+    if separator != "," and _DECIMAL_COMMA.fullmatch(cell):
+        return cell.replace(",", ".")
+    if _THOUSANDS_COMMA.fullmatch(cell):
+        return cell.replace(".", "").replace("'", "").replace(",", ".")
+    if _THOUSANDS_POINT.fullmatch(cell):
+        return cell.replace(",", "").replace("'", "")
+    return cell
 
 
 def _separates(mark: str, lines: list[str]) -> bool:
