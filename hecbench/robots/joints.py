@@ -124,13 +124,24 @@ def ordered(joints: list[Joint], links: list[str], path: Path) -> tuple[tuple[Jo
         for link in (joint.parent, joint.child):
             if link not in known:
                 raise InputError(
-                    f"{path}: joint '{joint.name}' hangs on no link of the tree: there is no '{link}'"
+                    f"{path}: joint '{joint.name}' hangs on no link of the tree: there is no '{link}'; correct the "
+                    f'joint, or add <link name="{link}"/>'
                 )
+    if not links:
+        raise InputError(
+            f"{path}: the robot has no <link>: is it an SRDF, or an xacro that is still to be expanded? Give the "
+            "expanded URDF"
+        )
     children = {joint.child for joint in joints}
     roots = [link for link in links if link not in children]
-    if len(roots) != 1:
+    if not roots:
         raise InputError(
-            f"{path}: a robot has one root link, this has {len(roots)}: {', '.join(roots) or 'a loop'}"
+            f"{path}: every link is some joint's child, so the joints form a loop: remove the joint that closes it"
+        )
+    if len(roots) > 1:
+        raise InputError(
+            f"{path}: a robot has one root link, this has {len(roots)}: {', '.join(roots)}: join them by a fixed joint, "
+            "or remove what does not belong to the robot"
         )
     below: dict[str, list[Joint]] = {}
     for joint in joints:
@@ -142,5 +153,8 @@ def ordered(joints: list[Joint], links: list[str], path: Path) -> tuple[tuple[Jo
         waiting += below.get(done[-1].child, ())
     if len(done) < len(joints):
         lost = next(joint for joint in joints if joint not in done)
-        raise InputError(f"{path}: joint '{lost.name}' hangs on no link of the tree: it is part of a loop")
+        raise InputError(
+            f"{path}: joint '{lost.name}' hangs on no link of the tree: it is part of a loop; remove the joint that "
+            "closes it"
+        )
     return tuple(done), (roots[0], *(joint.child for joint in done))

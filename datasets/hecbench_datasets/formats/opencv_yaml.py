@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -82,7 +83,7 @@ def _families(file: Path) -> dict[str, Array]:
     }
 
 
-def _numbered(content: object) -> Iterator[tuple[str, object]]:
+def _numbered(content: Any) -> Iterator[tuple[str, Any]]:
     """Names and matrices; those of a sequence are numbered from 0."""
     for name, value in content.items() if isinstance(content, dict) else ():
         if isinstance(value, list) and value and all(isinstance(one, np.ndarray) for one in value):

@@ -144,12 +144,13 @@ class SimulatedArm:
         """Take another tool centre point, as a pose vector (6,) from the flange."""
         self.tcp_offset, self.flange_T_tcp = vector, pose_of(vector)
 
-    def jacobian(self, joints_rad: ArrayLike | None = None) -> Array:
-        """Geometric Jacobian (6, 6) of the tool centre point in the base frame: [v; w] = J qd."""
+    def jacobian(self, joints_rad: ArrayLike | None = None, flange_T_tcp: Array | None = None) -> Array:
+        """Geometric Jacobian (6, 6) of a tool centre point, the present one by default: [v; w] = J qd, base frame."""
+        tool = self.flange_T_tcp if flange_T_tcp is None else flange_T_tcp
         frames = self.arm.link_frames(self.joints if joints_rad is None else joints_rad)
         axes = np.vstack([[0.0, 0.0, 1.0], frames[:5, :3, 2]])
         origins = np.vstack([np.zeros(3), frames[:5, :3, 3]])
-        tip = frames[5, :3, :3] @ self.flange_T_tcp[:3, 3] + frames[5, :3, 3]
+        tip = frames[5, :3, :3] @ tool[:3, 3] + frames[5, :3, 3]
         return np.vstack([np.cross(axes, tip - origins).T, axes.T])
 
     @property
@@ -169,10 +170,10 @@ class SimulatedArm:
             raise ScriptError("getInverseKin: unable to find an inverse kinematics solution")
         return np.asarray(solutions[0])
 
-    def is_reachable(self, base_T_tcp: Array, near_rad: ArrayLike) -> bool:
+    def is_reachable(self, base_T_tcp: Array, near_rad: ArrayLike, flange_T_tcp: Array | None = None) -> bool:
         """Whether `solve` finds joints."""
         try:
-            self.solve(base_T_tcp, near_rad)
+            self.solve(base_T_tcp, near_rad, flange_T_tcp)
         except ScriptError:
             return False
         return True
@@ -205,6 +206,11 @@ class SimulatedArm:
         joints, speeds = self.dynamics.accelerate(self.joints, self.joint_speeds, torques, self.dt_s)
         self.move(joints)
         self.joint_speeds = speeds
+
+    def feels_contact(self, direction: ArrayLike = (0.0, 0.0, 0.0)) -> bool:
+        """Whether a force at the tool is against a direction (3,) of the base frame; of any direction without one."""
+        along = np.asarray(direction, float)
+        return bool(-self.wrench[:3] @ along > 0 if along.any() else self.wrench[:3].any())
 
     def zero_force(self) -> None:
         """Report forces from here on relative to the present one."""

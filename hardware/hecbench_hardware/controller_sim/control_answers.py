@@ -42,7 +42,7 @@ class Answers:
             71: self._jacobian_rate,
         }
         verdicts: dict[int, Callable[[], int]] = {
-            25: lambda: int(self._arm.wrench[2] > 0),
+            25: lambda: int(self._arm.feels_contact(script.doubles(0, 3))),
             36: lambda: int(self._arm.is_reachable(script.pose(0), self._arm.joints)),
             37: lambda: int(np.abs(script.doubles(0)).max() <= self._arm.arm.joint_range_rad),
             47: lambda: int(self._arm.is_steady()),

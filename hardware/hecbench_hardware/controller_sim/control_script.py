@@ -22,6 +22,7 @@ from hecbench_hardware.controller_sim.force import ForceTask
 from hecbench_hardware.controller_sim.geometry import pose_of, vector_of
 from hecbench_hardware.controller_sim.motions import Motion, brake, move_joints, move_linear
 from hecbench_hardware.controller_sim.program import Program, ProgramRunner, Watchdog
+from hecbench_hardware.controller_sim.urscript.unsimulated import BLEND
 
 READY, DONE = 1, 2
 NAME = "rtde_control"
@@ -35,7 +36,7 @@ _HOLD_CYCLES = 10
 _HOLD_VERDICT_S = 0.1
 """How long a verdict does, by the clock of the client's computer: no busy client may take its absence for a no."""
 _NUMBER = r"[-+0-9.eE]+"
-_MOVE = re.compile(rf"move([jlp])\((p?)\[([^\]]*)\],\s*a=({_NUMBER}),\s*v=({_NUMBER})")
+_MOVE = re.compile(rf"move([jlp])\((p?)\[([^\]]*)\],\s*a=({_NUMBER}),\s*v=({_NUMBER})(?:,\s*r=({_NUMBER}))?")
 _SERVO_DECELERATION_RAD_S2 = 10.0
 
 
@@ -48,8 +49,9 @@ class ControlScript(ControlRegisters):
         injected = text.split("# inject move path\n", 1)[-1].split("\n    end", 1)[0]
         self._path = [
             (kind, bool(is_pose), np.array([float(x) for x in values.split(",")]), float(a), float(v))
-            for kind, is_pose, values, a, v in _MOVE.findall(injected)
+            for kind, is_pose, values, a, v, _ in _MOVE.findall(injected)
         ]
+        self._blends = any(float(r or 0) > 0 for *_, r in _MOVE.findall(injected))
         self._threads: dict[str, Motion] = {}
         self._servo_target = self._speed_target = self._speed_now = np.zeros(6)
         self._speed_acceleration = 0.0
@@ -59,6 +61,7 @@ class ControlScript(ControlRegisters):
         """Where the present motion goes, as a pose vector."""
         self.contact_cycles: int | None = None
         """Cycles since the first contact that contact detection saw; None while it is off."""
+        self._contact_direction = np.zeros(3)
         self._answers = Answers(self)
         self._actions = self._handlers()
 
@@ -131,7 +134,9 @@ class ControlScript(ControlRegisters):
         """Commands that take no time and answer nothing, by number."""
         runner, arm, d = self.runner, self.arm, self.doubles
         freedrive = partial(setattr, runner, "freedrive")
-        no_effect = partial(int)
+        no_effect = partial(
+            runner.admit, "damping and gain of force_mode: the force loop has no inertia and one gain"
+        )
         return {
             6: self._force_mode,
             7: lambda: setattr(runner, "force", None),
@@ -143,7 +148,7 @@ class ControlScript(ControlRegisters):
             17: self._set_payload,
             18: lambda: freedrive(True),
             19: lambda: freedrive(False),
-            **dict.fromkeys((20, 21), no_effect),  # damping and gain of a loop without inertia
+            **dict.fromkeys((20, 21), no_effect),
             24: lambda: self._servo(arm.solve(self.pose(0), arm.joints)),
             29: lambda: arm.set_tcp(d(0)),
             31: lambda: arm.protective_stop("asked for by the program"),
@@ -153,7 +158,7 @@ class ControlScript(ControlRegisters):
             53: lambda: freedrive(False),
             **dict.fromkeys((56, 57), lambda: setattr(arm, "external_sensor", self.integer(1) == 1)),
             59: lambda: setattr(arm, "gravity", d(0, 3).tolist()),
-            62: lambda: setattr(self, "contact_cycles", 0),
+            62: self._detect_contact,
             66: lambda: arm.push(d(0)),
             65: self._set_payload,
         }
@@ -190,6 +195,8 @@ class ControlScript(ControlRegisters):
 
     def _follow_path(self) -> Motion:
         arm = self.arm
+        if self._blends:
+            self.runner.admit(f"a path's {BLEND.said(1)}")
         for k, (kind, is_pose, values, acceleration, speed) in enumerate(self._path):
             self.report_progress(k)
             if kind == "j":
@@ -200,12 +207,16 @@ class ControlScript(ControlRegisters):
                 yield from move_linear(arm, target, speed, acceleration)
 
     def _until_contact(self) -> Motion:
-        twist = self.doubles(0)
-        while self.arm.wrench[2] <= 0:
+        twist, direction = self.doubles(0), self.doubles(6, 3)
+        towards = direction if direction.any() else twist[:3]
+        while not self.arm.feels_contact(towards):
             self.arm.drift(twist)
             yield
 
     def _servo(self, target: Array) -> None:
+        self.runner.admit(
+            "servoj(), servoc(): gain and lookahead_time: the arm follows as fast as its joints may"
+        )
         self._servo_target = target
         self._threads.setdefault("servo", self._keep_servoing())
 
@@ -259,8 +270,12 @@ class ControlScript(ControlRegisters):
             name = f"input_int_register_{self.register(0)}"
             self.runner.watchdog = Watchdog(name, hertz, "stop", self.runner.wall_s)
 
+    def _detect_contact(self) -> None:
+        self.contact_cycles, self._contact_direction = 0, self.doubles(0, 3)
+
     def _watch_contact(self) -> None:
-        if self.contact_cycles is None or (self.contact_cycles == 0 and self.arm.wrench[2] <= 0):
+        felt = self.contact_cycles is not None and self.arm.feels_contact(self._contact_direction)
+        if self.contact_cycles is None or (self.contact_cycles == 0 and not felt):
             return
         if self.contact_cycles == 0:
             self._stop_async_move()

@@ -62,6 +62,7 @@ class ProgramRunner:
         self._program: Program | None = None
         self._secondary: list[Program] = []
         self._hand: Motion | None = None
+        self._admitted: set[str] = set()
 
     def step(self) -> None:
         """Advance the programs and the arm by one cycle."""
@@ -92,6 +93,7 @@ class ProgramRunner:
             self.refuse(f"program {name} refused: the arm is not running")
             return
         self._program, self.name, self.runtime = program, name, RuntimeState.PLAYING
+        self._admitted.clear()
 
     def start_secondary(self, program: Program) -> None:
         """Run a program beside the main one; it must not take time on the arm."""
@@ -126,6 +128,13 @@ class ProgramRunner:
     def push_by_hand(self, joints_rad: Array) -> None:
         """Guide the arm to joints (6,) rad, as an operator does in freedrive."""
         self._hand = move_joints(self.arm, joints_rad, _HAND_SPEED_RAD_S, _HAND_ACCELERATION_RAD_S2)
+
+    def admit(self, what: str) -> None:
+        """Say, once a program, what it asks for and does not get: in the log and to the primary clients."""
+        if what not in self._admitted:
+            self._admitted.add(what)
+            self.arm.note(f"not simulated: {what}")
+            self.messages.text(self.arm.time_s, f"not simulated: {what}")
 
     def refuse(self, complaint: str, line: int = 0, column: int = 0) -> None:
         """Report what is wrong with a program in the log and on the primary interface."""

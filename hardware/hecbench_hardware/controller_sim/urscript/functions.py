@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from hecbench_hardware.controller_sim.arm import ScriptError
+from hecbench_hardware.controller_sim.urscript.unsimulated import UNSIMULATED, Unsimulated
 from hecbench_hardware.controller_sim.urscript.values import Value, bounded
 
 
@@ -20,12 +21,17 @@ class Builtin:
     name: str
     function: Callable[..., Any]
     parameters: tuple[tuple[str, Any], ...]
+    unsimulated: tuple[Unsimulated, ...] = ()
 
     def call(
         self, machine: Any, arguments: list[Value], keywords: dict[str, Value]
     ) -> Generator[None, None, Value]:
         """Run it; a wrong argument is an error of the program."""
         bound = self._bind(arguments, keywords)
+        for (name, _), value in zip(self.parameters, bound, strict=True):
+            for known in self.unsimulated:
+                if known.parameter == name and (said := known.said(value)):
+                    machine.runner.admit(f"{self.name}(): {said}")
         try:
             result = self.function(machine, *bound)
             if isinstance(result, Generator):
@@ -60,5 +66,6 @@ def builtins(*functions: Callable[..., Any]) -> dict[str, Builtin]:
     for function in functions:
         parameters = list(inspect.signature(function).parameters.values())[1:]
         name = function.__name__.rstrip("_")
-        found[name] = Builtin(name, function, tuple((p.name.rstrip("_"), p.default) for p in parameters))
+        written = tuple((p.name.rstrip("_"), p.default) for p in parameters)
+        found[name] = Builtin(name, function, written, UNSIMULATED.get(name, ()))
     return found

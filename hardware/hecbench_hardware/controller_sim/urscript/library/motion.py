@@ -35,7 +35,7 @@ def pose_of_target(m: Machine, target: Value) -> Array:
 
 
 def movej(m: Machine, q: Value, a: Value = 1.4, v: Value = 1.05, t: Value = 0, r: Value = 0) -> Motion:
-    """Straight in joint space; the blend radius is not simulated, the arm stops at the point."""
+    """Straight in joint space; the arm stops at the point."""
     joints = joints_of(m, q)
     m.waypoint = vector_of(m.arm.arm.forward(joints) @ m.arm.flange_T_tcp)
     return move_joints(m.arm, joints, number(v), number(a), number(t))
@@ -87,7 +87,7 @@ def servoj(
     lookahead_time: Value = 0.1,
     gain: Value = 300,
 ) -> Motion:
-    """Towards joints for the time t, as fast as the joints may; look-ahead and gain are not simulated."""
+    """Towards joints for the time t, as fast as the joints may."""
     target, end = joints_of(m, q), m.arm.time_s + max(number(t), m.arm.dt_s)
     while m.arm.time_s < end - m.arm.dt_s / 2:
         m.arm.follow(target, _SERVO_SPEED_RAD_S)

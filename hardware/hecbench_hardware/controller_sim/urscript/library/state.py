@@ -46,7 +46,7 @@ def get_inverse_kin_has_solution(
 ) -> bool:
     """Whether there are such joints."""
     near = m.arm.joints if qnear is None else vector(qnear, 6, "qnear")
-    return m.arm.is_reachable(pose(pose_), near)
+    return m.arm.is_reachable(pose(pose_), near, _tool(m, tcp))
 
 
 def get_forward_kin(m: Machine, q: Value = None, tcp: Value = "active_tcp") -> Pose:
@@ -71,23 +71,26 @@ def get_target_waypoint(m: Machine) -> Pose:
 def is_within_safety_limits(m: Machine, pose_: Value, qnear: Value = None) -> bool:
     """Whether a pose or joints are in reach; there are no other safety limits here."""
     if isinstance(pose_, Pose):
-        return m.arm.is_reachable(pose_.matrix, m.arm.joints)
+        return m.arm.is_reachable(pose_.matrix, m.arm.joints if qnear is None else vector(qnear, 6, "qnear"))
     return bool(np.abs(vector(pose_, 6, "the joints")).max() <= m.arm.arm.joint_range_rad)
 
 
 def tool_contact(m: Machine, direction: Value = None) -> int:
-    """1 while the contact plane or a push is felt, 0 otherwise; the direction is not simulated."""
-    return int(m.arm.wrench[2] > 0)
+    """1 while a force against the direction, of any direction without one, is felt; 0 otherwise."""
+    return int(m.arm.feels_contact([0.0] * 3 if direction is None else vector(direction, 6, "direction")[:3]))
 
 
 def get_joint_temp(_: Machine, j: Value) -> float:
-    """Nominal."""
+    """Nominal, of joints 0 to 5."""
+    if j not in range(6):
+        raise ValueError(f"there is no joint {j}: joints are 0 to 5")
     return TEMPERATURE_C
 
 
 def get_jacobian(m: Machine, q: Value = None, tcp: Value = "active_tcp") -> list[list[float]]:
-    """The geometric Jacobian of the present tool."""
-    rows: list[list[float]] = m.arm.jacobian(None if q is None else vector(q, 6, "q")).tolist()
+    """The geometric Jacobian of a tool, the present one by default."""
+    joints = None if q is None else vector(q, 6, "q")
+    rows: list[list[float]] = m.arm.jacobian(joints, _tool(m, tcp)).tolist()
     return rows
 
 
