@@ -140,8 +140,8 @@ def ordered(joints: list[Joint], links: list[str], path: Path) -> tuple[tuple[Jo
         )
     if len(roots) > 1:
         raise InputError(
-            f"{path}: a robot has one root link, this has {len(roots)}: {', '.join(roots)}: join them by a fixed joint, "
-            "or remove what does not belong to the robot"
+            f"{path}: a robot has one root link, this has {len(roots)}: {', '.join(roots)}: join them by a fixed "
+            "joint, or remove what does not belong to the robot"
         )
     below: dict[str, list[Joint]] = {}
     for joint in joints:
