@@ -15,7 +15,7 @@ from hecbench.se3 import Array
 from hecbench_hardware.devices import DeviceFault, Fault, RobotState
 from hecbench_hardware.kinematics import Arm
 from hecbench_hardware.ur.process import Worker, WorkerGone
-from hecbench_hardware.ur.worker import SAMPLE
+from hecbench_hardware.ur.worker import CONNECT_S, SAMPLE
 
 _RUNNING_MODE = 7
 _PLAYING = 2
@@ -154,9 +154,13 @@ class StateStream:
         self._thread.start()
 
     def _connected(self, host: str) -> tuple[Worker, Sample]:
-        """A worker and its first sample; the client can crash when a slow controller lets it wait for that one."""
-        detail = ""
+        """A worker and its first sample; the client can crash when a slow controller lets it wait for that one.
+
+        Another attempt is made while one as long as the last still fits into the time for connecting.
+        """
+        detail, end_s = "", time.monotonic() + CONNECT_S * self._supervision.leniency
         for _ in range(_CONNECTS):
+            began_s = time.monotonic()
             worker = Worker("receive", host, leniency=self._supervision.leniency)
             try:
                 worker.ready()
@@ -164,6 +168,9 @@ class StateStream:
             except (EOFError, OSError):
                 detail = "the client ended before the first state"
                 worker.end()
+                now_s = time.monotonic()
+                if now_s + (now_s - began_s) > end_s:
+                    break
             except (WorkerGone, HecbenchError) as error:
                 detail = str(error)
                 break
