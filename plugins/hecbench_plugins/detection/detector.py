@@ -122,11 +122,7 @@ def _calibrated(
         result = calibrate(target.points_m, corners_px, (width, height))
     except InputError as error:
         raise InputError(f"{recording.name}: {error}") from error
-    K = result.camera.intrinsics
-    return result.camera, (
-        f"intrinsics calibrated from {result.images} images: fx {K[0, 0]:.1f}, fy {K[1, 1]:.1f} "
-        f"+- {result.focal_sigma_px:.1f} px, rms {result.rms_px:.2f} px"
-    )
+    return result.camera, str(result)
 
 
 def _turn(recording: Recording, shape: tuple[int, int]) -> tuple[Recording, str]:

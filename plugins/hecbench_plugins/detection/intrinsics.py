@@ -1,10 +1,18 @@
-"""Intrinsics from the same images (Zhang 2000, "A flexible new technique for camera calibration")."""
+"""Intrinsics from the same images (Zhang 2000, "A flexible new technique for camera calibration").
+
+Of the lens models the richest is taken that predicts left-out images as well as the best one (Stone 1974,
+"Cross-validatory choice and assessment of statistical predictions") and whose terms the views determine up to the
+picture's corners. A term that they do not determine fits their noise, and takes focal length and centre with it; one
+that is left out although the lens has it shifts them by more than their standard deviations say.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.errors import InputError
@@ -13,63 +21,214 @@ from hecbench.se3 import Array
 
 LEAST_IMAGES = 3
 LEAST_POINTS = 6
-_ENOUGH_FOR_ALL_TERMS = 10
-"""Below so many images only k1 and k2 are estimated: the tangential terms and k3 would fit the noise."""
+TERMS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
+LENSES = (
+    (),
+    ("k1",),
+    ("k1", "k2"),
+    ("k1", "p1", "p2"),
+    ("k1", "k2", "p1", "p2"),
+    ("k1", "k2", "p1", "p2", "k3"),
+)
+"""The lens models, by the terms that are free, from the poorest to the richest."""
+_AS_WELL = 1.05
+"""Mean squared error of prediction over that of the best lens."""
+_CORNER_SHARE = 0.01
+"""Standard deviation of what the last radial term moves a point in the picture's corner, over its distance from the
+middle."""
+_FEW_VIEWS_LENS = LENSES[1]
+"""Of fewer views than can be left out in turn."""
+_FOLDS = 5
+_MOST_COMPARED = 20
+"""Views that the lens models are compared on."""
 _MOST_UNCERTAIN = 0.1
+_MOST_UNCERTAIN_CENTRE = 0.02
+"""Standard deviations beyond which the views are said to leave a parameter open: of the focal length, over itself, and
+of the centre, over the picture's width."""
 _LEAST_TILT_RAD = np.deg2rad(8.0)
+_SAME_PX = 0.7
+"""Views whose points lie this near to each other, rms, are one: the arm stood still."""
+
+Views = list[tuple[NDArray[np.float32], NDArray[np.float32]]]
+"""Points (P, 3) m and corners (P, 2) px of each view."""
 
 
 @dataclass(frozen=True, eq=False)
 class Calibrated:
-    """The camera, its reprojection rms in px, and the standard deviation of its focal length in px."""
+    """A camera from its pictures.
+
+    Attributes:
+        camera: with five coefficients of distortion, those that are not free 0.
+        rms_px: of the reprojection.
+        sigmas: standard deviations of `TERMS` (9,), px and 1; 0 of terms that are not free.
+        lens: the lens terms that are free.
+        images: that show the target, and are from different poses.
+        coverage: share of the picture within the hull of all corners.
+        tilt_rad: largest angle between the target's normals.
+    """
 
     camera: CameraModel
     rms_px: float
-    focal_sigma_px: float
+    sigmas: Array
+    lens: tuple[str, ...]
     images: int
+    coverage: float
+    tilt_rad: float
+
+    def __str__(self) -> str:
+        K = self.camera.intrinsics
+        values = [K[0, 0], K[1, 1], K[0, 2], K[1, 2], *self.camera.distortion]
+        free = [*TERMS[:4], *self.lens]
+        shown = [
+            f"{name} {value:.{1 if name in TERMS[:4] else 4}f} +- {sigma:.{1 if name in TERMS[:4] else 4}f}"
+            for name, value, sigma in zip(TERMS, values, self.sigmas, strict=True)
+            if name in free
+        ]
+        return (
+            f"intrinsics calibrated from {self.images} images: {', '.join(shown)}; rms {self.rms_px:.2f} px; the "
+            f"corners cover {100 * self.coverage:.0f} % of the picture, the target's tilt changes by up to "
+            f"{np.rad2deg(self.tilt_rad):.0f} deg"
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    K: Array
+    distortion: Array
+    rms_px: float
+    sigmas: Array
+    normals: Array
 
 
 def calibrate(points_m: Array, corners_px: Array, size: tuple[int, int]) -> Calibrated:
     """K and distortion from a planar target's points (P, 3) m and corners (N, P, 2) px, NaN where not seen.
 
     Raises:
-        InputError: fewer than 3 images show 6 points, the target is not planar, or the views are too alike
-            to tell the focal length.
+        InputError: fewer than 3 different views show 6 points, the target is not planar, or the views leave the focal
+            length or the centre open.
     """
-    import cv2
-
-    seen = [np.isfinite(corners[:, 0]) for corners in corners_px]
-    used = [i for i, mask in enumerate(seen) if mask.sum() >= LEAST_POINTS]
-    if len(used) < LEAST_IMAGES:
+    views = _different(points_m, corners_px)
+    if len(views) < LEAST_IMAGES:
         raise InputError(
-            f"camera.K: is unknown, and {len(used)} images show {LEAST_POINTS} or more target points; "
-            f"calibrating it takes {LEAST_IMAGES}: give K, or more images"
+            f"camera.K: is unknown, and {len(views)} images from different poses show {LEAST_POINTS} or more target "
+            f"points; calibrating it takes {LEAST_IMAGES}: give K, or more images"
         )
     if (points_m[:, 2] != 0).any():
         raise InputError(
             "camera.K: is unknown, and cannot be calibrated from a target that is not flat: give K"
         )
-    object_points = [points_m[seen[i]].astype(np.float32) for i in used]
-    image_points = [corners_px[i][seen[i]].astype(np.float32) for i in used]
-    flags = 0
-    if len(used) < _ENOUGH_FOR_ALL_TERMS:
-        flags = cv2.CALIB_FIX_K3 | cv2.CALIB_ZERO_TANGENT_DIST
-    try:
-        rms, K, distortion, rotvecs, _, sigmas, _, _ = cv2.calibrateCameraExtended(
-            object_points, image_points, size, None, None, flags=flags
-        )
-    except cv2.error as error:
-        raise InputError(f"camera.K: the views do not determine it ({error.err}); tilt the target") from error
-    normals = se3.so3_exp(np.reshape(rotvecs, (-1, 3)))[:, :, 2]
-    tilt = float(np.arccos(np.clip(normals @ normals.T, -1, 1)).max())
+    lens = _lens(views, size)
+    fit = _fitted(views, size, lens)
+    tilt = float(np.arccos(np.clip(fit.normals @ fit.normals.T, -1, 1)).max())
+    _refuse_undetermined(fit, tilt, size)
+    camera = CameraModel(*size, fit.K, fit.distortion)
+    return Calibrated(camera, fit.rms_px, fit.sigmas, lens, len(views), _coverage(views, size), tilt)
+
+
+def _refuse_undetermined(fit: _Fit, tilt: float, size: tuple[int, int]) -> None:
     if tilt < _LEAST_TILT_RAD:
         raise InputError(
             f"camera.K: the views are within {np.rad2deg(tilt):.1f} degrees of each other, which leaves the "
             "focal length open; tilt the target"
         )
-    sigma = float(np.max(sigmas[:2]))
-    if not np.isfinite(K).all() or not sigma < _MOST_UNCERTAIN * K[0, 0]:
+    focal, centre = float(fit.sigmas[:2].max()), float(fit.sigmas[2:4].max())
+    if not np.isfinite(fit.K).all() or not focal < _MOST_UNCERTAIN * fit.K[0, 0]:
         raise InputError(
-            f"camera.K: the views leave the focal length at {K[0, 0]:.0f} +- {sigma:.0f} px; tilt the target"
+            f"camera.K: the views leave the focal length at {fit.K[0, 0]:.0f} +- {focal:.0f} px; tilt the target"
         )
-    return Calibrated(CameraModel(*size, K, distortion.ravel()[:5]), float(rms), sigma, len(used))
+    if not centre < _MOST_UNCERTAIN_CENTRE * size[0]:
+        raise InputError(
+            f"camera.K: the views leave the centre at ({fit.K[0, 2]:.0f}, {fit.K[1, 2]:.0f}) +- {centre:.0f} px; tilt "
+            "the target to all sides, and show it in the picture's corners too"
+        )
+
+
+def _different(points_m: Array, corners_px: Array) -> Views:
+    """The views that show enough of the target, one of those in which it stands still."""
+    kept: list[Array] = []
+    for corners in corners_px:
+        if np.isfinite(corners[:, 0]).sum() >= LEAST_POINTS and not any(
+            _same(corners, other) for other in kept
+        ):
+            kept.append(corners)
+    seen = [np.isfinite(corners[:, 0]) for corners in kept]
+    return [
+        (points_m[mask].astype(np.float32), corners[mask].astype(np.float32))
+        for mask, corners in zip(seen, kept, strict=True)
+    ]
+
+
+def _same(corners: Array, other: Array) -> bool:
+    squares = ((corners - other) ** 2).sum(1)
+    both = np.isfinite(squares)
+    return bool(both.any() and np.sqrt(squares[both].mean()) < _SAME_PX)
+
+
+def _lens(views: Views, size: tuple[int, int]) -> tuple[str, ...]:
+    """The richest lens that predicts left-out views as well as any, and is known up to the corners."""
+    if len(views) < _FOLDS:
+        return _FEW_VIEWS_LENS
+    chosen = np.unique(np.linspace(0, len(views) - 1, _MOST_COMPARED).round().astype(int))
+    compared = [views[i] for i in chosen]
+    errors = [float(_predicted(compared, size, lens).mean()) for lens in LENSES]
+    good = [lens for lens, error in zip(LENSES, errors, strict=True) if error <= _AS_WELL * min(errors)]
+    known = [lens for lens in good if _corner_sigma(_fitted(views, size, lens), lens, size) < _CORNER_SHARE]
+    return known[-1] if known else good[0]
+
+
+def _corner_sigma(fit: _Fit, lens: Sequence[str], size: tuple[int, int]) -> float:
+    """Relative standard deviation of where a point in the picture's corner is, by the last radial term alone."""
+    radial = [term for term in lens if term.startswith("k")]
+    if not radial:
+        return 0.0
+    radius = float(np.hypot(size[0] / fit.K[0, 0], size[1] / fit.K[1, 1])) / 2
+    return float(fit.sigmas[TERMS.index(radial[-1])]) * radius ** (2 * len(radial))
+
+
+def _predicted(views: Views, size: tuple[int, int], lens: tuple[str, ...]) -> Array:
+    """Mean squared error, px^2, of each view (N,) when the camera comes from the others."""
+    import cv2
+
+    errors = np.full(len(views), np.inf)
+    for fold in range(_FOLDS):
+        left_out = range(fold, len(views), _FOLDS)
+        try:
+            fit = _fitted([view for i, view in enumerate(views) if i % _FOLDS != fold], size, lens)
+        except InputError:
+            continue
+        for i in left_out:
+            points, corners = views[i]
+            found, rotvec, shift = cv2.solvePnP(points, corners, fit.K, fit.distortion)
+            if found:
+                seen, _ = cv2.projectPoints(points, rotvec, shift, fit.K, fit.distortion)
+                errors[i] = float(((seen[:, 0] - corners) ** 2).sum(1).mean())
+    return np.asarray(np.minimum(errors, float(size[0]) ** 2))
+
+
+def _fitted(views: Views, size: tuple[int, int], lens: Sequence[str]) -> _Fit:
+    import cv2
+
+    fixed = {
+        "k1": cv2.CALIB_FIX_K1,
+        "k2": cv2.CALIB_FIX_K2,
+        "k3": cv2.CALIB_FIX_K3,
+        "p1": cv2.CALIB_ZERO_TANGENT_DIST,
+    }
+    flags = sum(flag for term, flag in fixed.items() if term not in lens)
+    points, corners = zip(*views, strict=True)
+    try:
+        rms, K, distortion, rotvecs, _, sigmas, _, _ = cv2.calibrateCameraExtended(
+            points, corners, size, None, None, flags=flags
+        )
+    except cv2.error as error:
+        raise InputError(f"camera.K: the views do not determine it ({error.err}); tilt the target") from error
+    normals = se3.so3_exp(np.reshape(rotvecs, (-1, 3)))[:, :, 2]
+    return _Fit(K, distortion.ravel()[:5], float(rms), np.ravel(sigmas)[: len(TERMS)], normals)
+
+
+def _coverage(views: Views, size: tuple[int, int]) -> float:
+    """Share of the picture within the hull of all corners."""
+    import cv2
+
+    hull = cv2.convexHull(np.concatenate([corners for _, corners in views]))
+    return float(cv2.contourArea(hull)) / (size[0] * size[1])
