@@ -26,6 +26,8 @@ _MOTIONS = {
 }
 _BASES = ("floating", "planar")
 _LIMITED = ("revolute", "prismatic")
+_WORLD = "world"
+"""The frame that a joint may hang on without a link of that name, as Drake has it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,6 +107,8 @@ def read(path: Path) -> Description:
     reader.refuse_twice("link", links)
     reader.refuse_twice("joint", [joint.name for joint in joints])
     reader.refuse_twice("the child of two joints: link", [joint.child for joint in joints])
+    if _WORLD not in links and any(joint.parent == _WORLD for joint in joints):
+        links.insert(0, _WORLD)
     tree, order = ordered(joints, links, path)
     reader.refuse_bases_above_others(tree, order[0])
     visuals = [visual for link in root.findall("link") for visual in reader.visuals(link)]
@@ -242,10 +246,15 @@ class _Reader:
                     f"{where} without a shape: left out; give its <geometry> a mesh, or remove it"
                 )
                 continue
+            shape = self._shape(geometry[0], where)
+            if shape is None:
+                self.notes.append(f"{where}: its {geometry[0].tag} has no size: left out")
+                continue
             colour, texture = self._material(visual.find("material"), where)
-            yield Visual(link, self.origin(visual, where), self._shape(geometry[0], where), colour, texture)
+            yield Visual(link, self.origin(visual, where), shape, colour, texture)
 
-    def _shape(self, element: Any, where: str) -> Mesh | Primitive:
+    def _shape(self, element: Any, where: str) -> Mesh | Primitive | None:
+        """What is drawn; None for a primitive of size 0."""
         kind, where = str(element.tag), f"{where}: {element.tag}"
         if kind == "mesh":
             if not (filename := element.get("filename", "").strip()):
@@ -264,9 +273,9 @@ class _Reader:
             sizes = tuple(self.numbers(element, "radius", 1, where))
         else:
             raise InputError(f"{self.path}: {where} is not supported: use mesh, box, cylinder or sphere")
-        if min(sizes) <= 0:
+        if min(sizes) < 0:
             raise InputError(f"{self.path}: {where}: its sizes must be positive")
-        return Primitive(kind, tuple(float(size) for size in sizes))
+        return None if min(sizes) == 0 else Primitive(kind, tuple(float(size) for size in sizes))
 
     def _material(self, material: Any, where: str) -> tuple[Colour | None, str | None]:
         """Colour and texture of a visual; a material may be defined anywhere, the first definition counts."""

@@ -9,12 +9,15 @@ from hecbench.errors import InputError
 _HARMLESS = "NS_ERR_UNDEFINED_NAMESPACE"
 """A prefix nobody declared: the names with a prefix are other programs', and are dropped."""
 
+_DECLARED = ("ENCODING", "VERSION")
+"""What may be wrong with the declaration in the first line; the document is then read without it."""
+
 
 def parse(content: bytes, where: str, *, mesh: bool = False) -> Any:
     """The root element (lxml) of a document in any encoding, without comments.
 
     Text that is not in its encoding is taken for Latin-1, in which every byte is a letter: it stands in comments
-    as a rule.
+    as a rule. A declaration of another version than XML's only one is passed over.
 
     Args:
         content: the file.
@@ -28,7 +31,7 @@ def parse(content: bytes, where: str, *, mesh: bool = False) -> Any:
 
     content = content.lstrip()
     root, fault = _root(content, _parser(mesh))
-    if root is None or (fault is not None and "ENCODING" in fault.type_name):
+    if root is None or (fault is not None and any(word in fault.type_name for word in _DECLARED)):
         head, end, body = content.partition(b"?>")
         plain = body if head.startswith(b"<?xml") and end else content
         again, other = _root(plain.decode("latin-1").encode(), _parser(mesh))

@@ -47,3 +47,27 @@ def test_one_link_is_a_robot_without_joints(tmp_path):
     path = tmp_path / "r.urdf"
     path.write_text(f'<robot name="r">{link("a")}</robot>')
     assert load_robot(path).joint_names == ()
+
+
+def test_the_world_needs_no_link(tmp_path):
+    path = tmp_path / "r.urdf"
+    path.write_text(f'<robot name="r">{link("a")}{joint("weld", "world", "a")}</robot>')
+    assert load_robot(path).links == ("world", "a")
+
+
+@pytest.mark.parametrize("version", ["0.0", "1.1", "2.0"])
+def test_a_declaration_of_another_version_is_passed_over(tmp_path, version):
+    path = tmp_path / "r.urdf"
+    path.write_text(f'<?xml version="{version}" ?><robot name="r">{link("a")}</robot>')
+    assert load_robot(path).links == ("a",)
+
+
+@pytest.mark.parametrize(
+    "shape", ['<box size="0 0 0"/>', '<sphere radius="0"/>', '<cylinder radius="1" length="0"/>']
+)
+def test_a_shape_without_a_size_is_left_out_with_a_note(tmp_path, shape):
+    path = tmp_path / "r.urdf"
+    path.write_text(
+        f'<robot name="r"><link name="a"><visual><geometry>{shape}</geometry></visual></link></robot>'
+    )
+    assert "has no size: left out" in load_robot(path).notes[0]
