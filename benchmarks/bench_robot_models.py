@@ -5,7 +5,8 @@ BSD-3 and MIT, each model under its maker's licence; nothing of them is kept her
 
 Run: ``python benchmarks/bench_robot_models.py matrix|load --models MODELS [--items 3] [--out FILE.json]``.
 `matrix` prints, for each cell, the median TRE over the arms with its bootstrap interval, and how many ends were `ok`
-above 5 mm; `load` reads every URDF below MODELS.
+above 5 mm; `load` reads every URDF below MODELS. Further packages that hold some: pybullet (without random_urdfs),
+mani_skill, icub-models, drake, hello-robot-stretch-urdf, rtb-data, robosuite, reachy_mini and scikit-robot.
 """
 
 import argparse

@@ -17,6 +17,7 @@ from hecbench.report.recording_figures import agreement_figure, overlays, residu
 from hecbench.report.section import Section
 from hecbench.report.studies import is_study
 from hecbench.report.studies import sections as sections_of_studies
+from hecbench.report.summary import summary
 from hecbench.report.tables import Group, groups, table
 from hecbench.report.trials import sections as sections_of_trials
 from hecbench.storage import evidence, results, store, trial_record
@@ -97,6 +98,10 @@ def page(
     ordered = sorted(groups(estimates), key=lambda group: (group.is_level, group.title != judged))
     sections += [_section(group, evidence, has_dots=group.title == judged) for group in ordered]
     sections.sort(key=lambda section: section.folded)
+    sections = (
+        summary([group for group in ordered if group.is_level and not is_study(group.estimates[0].suite)])
+        + sections
+    )
     return environment.get_template("report.html.j2").render(
         sections=sections,
         first=first,

@@ -6,11 +6,18 @@ import io
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 DARK, LIGHT, RED = "#12355b", "#8fa6c2", "#d1495b"
+_SHORT, _LONG = 0.7, 1.7
+"""Decades of an axis below which its ticks are evenly spaced, and from which on only powers have numbers."""
+_BETWEEN = "25"
+"""First digits of the ticks that have numbers beside the powers."""
 COLOURS = (DARK, RED, "#2e8b57", "#edae49", "#7b4fa3", "#00798c", "#8c564b", "#5c6670")
 
 
@@ -48,6 +55,10 @@ def svg(figure: Figure) -> str:
     import matplotlib
     from matplotlib.text import Text
 
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            if axis.get_scale() != "linear":
+                _plain_numbers(axis)
     for text in figure.findobj(Text):
         text.set_parse_math(False)
     stream = io.StringIO()
@@ -55,3 +66,16 @@ def svg(figure: Figure) -> str:
         figure.savefig(stream, format="svg", metadata={"Date": None})
     written = stream.getvalue()
     return written[written.index("<svg") :]
+
+
+def _plain_numbers(axis: Axis) -> None:
+    """Numbers instead of powers at the ticks of a logarithmic axis, some of them however short it is."""
+    from matplotlib.ticker import MaxNLocator
+
+    low, high = axis.get_view_interval()
+    decades = np.log10(high / low) if low > 0 else np.inf
+    if decades < _SHORT:
+        axis.set_major_locator(MaxNLocator(4))
+    axis.set_major_formatter("{x:g}")
+    shown = _BETWEEN if _SHORT <= decades < _LONG else ""
+    axis.set_minor_formatter(lambda x, _: f"{x:g}" if f"{x:e}"[0] in shown else "")

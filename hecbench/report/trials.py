@@ -191,6 +191,8 @@ def success_against(trials: Sequence[tuple[TrialRecord, float]], name: str, titl
     edges = np.array([0.0, 0.5, 1, 1.5, 2, 3, 5, 10, 15, 20, 30, 50, 100])
     for number, task in enumerate(TASKS):
         known = [(trial, error) for trial, error in trials if trial.task == task]
+        if not known:
+            continue
         errors = np.array([error for _, error in known])
         success = np.array([trial.outcome is Outcome.SUCCESS for trial, _ in known])
         which = np.clip(np.digitize(errors, edges) - 1, 0, len(edges) - 1)
@@ -201,8 +203,9 @@ def success_against(trials: Sequence[tuple[TrialRecord, float]], name: str, titl
             axes.plot([x, x], [interval.low, interval.high], color=COLOURS[number], linewidth=2, alpha=0.5)
             label = task if place == which.min() else None
             axes.plot([x], [interval.value], "os"[number], color=COLOURS[number], label=label)
+    every = [error for _, error in trials]
     axes.set(xscale="symlog", xlabel=f"{name}, mm", ylabel="share of successes", ylim=(-0.03, 1.03))
-    axes.xaxis.set_major_formatter("{x:g}")
+    axes.set_xlim(0.7 * min(every) - 0.1, 1.4 * max(every) + 0.1)
     axes.set_title(title)
     axes.legend(frameon=False)
     axes.grid(True, alpha=0.25)
@@ -218,12 +221,13 @@ def margins(trials: Sequence[TrialRecord], title: str) -> str:
         for row, method in enumerate(methods):
             values = [t.margin_mm for t in _of(trials, method, task) if t.margin_mm is not None]
             heights = row + 0.2 * (number - 0.5) * 2 + rng.uniform(-0.1, 0.1, len(values))
-            label = task if row == 0 else None
+            if not values:
+                continue
+            label = task if task not in axes.get_legend_handles_labels()[1] else None
             axes.plot(values, heights, ".", markersize=4, color=COLOURS[number], alpha=0.6, label=label)
     axes.axvline(0.0, color="#1c2733", linewidth=0.8)
     axes.set_yticks(range(len(methods)), methods)
     axes.set_xscale("symlog", linthresh=1.0)
-    axes.xaxis.set_major_formatter("{x:g}")
     axes.set(xlabel="margin, mm", title=title)
     axes.legend(frameon=False, loc="center left", bbox_to_anchor=(1.01, 0.5))
     axes.grid(True, axis="x", alpha=0.25)
@@ -248,4 +252,6 @@ def _median(values: Iterable[float | None]) -> str:
 
 
 def _range(interval: statistics.Interval) -> str:
+    if not np.isfinite([interval.low, interval.high]).all():
+        return ABSENT
     return f"[{100 * interval.low:.0f}, {100 * interval.high:.0f}] %"

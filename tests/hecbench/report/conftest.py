@@ -1,10 +1,16 @@
-"""Made-up results of studies whose every number is known."""
+"""Made-up results of studies whose every number is known, and pages in a browser."""
+
+import json
 
 import numpy as np
 import pytest
 
-from hecbench import se3
+from hecbench import registry, se3
 from hecbench.estimate import Estimate, Status, Termination
+from hecbench.report import html, pictures
+from hecbench.running import calibrating
+from hecbench.running.solving import Options
+from hecbench.specs import Kind, SolverSpec, SuiteSpec
 
 
 def make_run(
@@ -130,3 +136,55 @@ def study_runs(count=20, seed=0):
 def studies():
     """Results of all studies."""
     return study_runs(count=6)
+
+
+class Screen:
+    """A browser's window on a page."""
+
+    def __init__(self, browser):
+        self._browser = browser
+
+    def at_size(self, width, height):
+        """Headless windows have a least width; the device metrics have none."""
+        metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": width < 600}
+        self._browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+
+    def open(self, page):
+        self._browser.get(page.as_uri())
+
+    def errors(self):
+        return [entry for entry in self._browser.get_log("browser") if entry["level"] == "SEVERE"]
+
+    def run(self, script):
+        return self._browser.execute_script(script)
+
+    def bottom(self, selector):
+        return self.run(
+            f"return document.querySelector({json.dumps(selector)}).getBoundingClientRect().bottom"
+        )
+
+
+@pytest.fixture
+def screen(browser):
+    return Screen(browser)
+
+
+@pytest.fixture(scope="session")
+def photographs():
+    return registry.load().get(Kind.SUITE, "photographs", SuiteSpec).make("ur3e", 0, 0)
+
+
+@pytest.fixture(scope="session")
+def calibrated():
+    """Makes the page of a recording calibrated by some solvers, in a folder."""
+
+    def make(folder, recording, names):
+        specs = [registry.load().get(Kind.SOLVER, name, SolverSpec) for name in names]
+        examined = calibrating.examine(recording.without_truth())
+        estimates = calibrating.solved(examined, specs, Options())
+        found = calibrating.judged(examined, specs, estimates)
+        calibrating.Calibration(found, examined.evidence()).save(folder)
+        pictures.write(examined.segmented.recording, found.recommended, folder)
+        return html.write(folder).path
+
+    return make
