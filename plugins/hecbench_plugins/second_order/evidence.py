@@ -13,6 +13,7 @@ from hecbench import se3
 from hecbench.estimate import Estimate, Termination
 from hecbench.se3 import Array
 from hecbench_plugins.second_order.descent import Descent, Trace, draw_counted
+from hecbench_plugins.second_order.flatness import edge_excess
 from hecbench_plugins.second_order.photometry import Photometry
 from hecbench_plugins.second_order.settings import EVIDENCE
 from hecbench_plugins.second_order.silhouette import contour_rows, distances_at, outer
@@ -65,7 +66,7 @@ def to_estimate(
     The covariance is the inverse Fisher information of the last comparison, Huber off, with the noise of its own
     residuals (Hartley and Zisserman 2004, section 5.2); correlated residuals count as fewer. The errors of the
     estimated colours are carried on, and so is what stages that explain the same evidence disagree about, and the
-    error that all pictures share.
+    error that all pictures share, as far as their edges are not drawn ones.
     """
     camera_T_parent = end.descent.pose
     end.photometry.huber = np.inf
@@ -89,6 +90,8 @@ def to_estimate(
     if seen_from_camera is not None:
         focal_px = float(np.asarray(views[0].levels[1].renderer.K)[0, 0])
         shared = common_error(camera_T_parent, [view.parent_T_link for view in views], focal_px)
+        if end.kind == "colour":
+            shared *= min(1.0, edge_excess(end.photometry) / EVIDENCE.averaged_edges) ** 2
         covariance = se3.inverse_covariance(camera_T_parent, seen_from_camera + shared)
     diagnostics["weakest_direction"] = [round(float(part), 3) for part in directions[:, 0]]
     parent_T_root = views[0].parent_T_link[0]

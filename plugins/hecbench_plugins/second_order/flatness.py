@@ -1,4 +1,4 @@
-"""Whether the parts and the background of pictures are flat: the comparison of colours knows nothing else."""
+"""Whether pictures are what the comparison of colours takes them for: flat parts and background, drawn edges."""
 
 from __future__ import annotations
 
@@ -27,6 +27,24 @@ def unevenness(photometry: Photometry) -> float:
         for region in (inner & (part < 0), inner & (part >= 0)):
             worst = max(worst, _shared(residual, region))
     return float(np.sqrt(worst))
+
+
+def edge_excess(photometry: Photometry) -> float:
+    """How much larger the residuals of the pictures drawn last are beside edges than inside parts, rms in [0, 1].
+
+    A camera averages over its pixels, where a drawn edge is straight: that shows beside edges alone.
+    """
+    beside, inside = [np.zeros(0, np.float32)], [np.zeros(0, np.float32)]
+    for view, residual in zip(photometry.views, photometry.residuals, strict=True):
+        at = view.levels[photometry.level]
+        box = photometry.box(at)
+        part = at.renderer.part[box[2] : box[3] + 1, box[0] : box[1] + 1]
+        inner = _inner(part)
+        beside.append((residual[~inner] ** 2).ravel())
+        inside.append((residual[inner & (part >= 0)] ** 2).ravel())
+    edges, parts = np.concatenate(beside), np.concatenate(inside)
+    more = (edges.mean() if len(edges) else 0.0) - (parts.mean() if len(parts) else 0.0)
+    return float(np.sqrt(max(more, 0.0)))
 
 
 def _inner(part: NDArray[np.int32]) -> NDArray[np.bool_]:
