@@ -4,47 +4,53 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from hecbench import statistics
-from hecbench.estimate import Status
+from hecbench.estimate import Estimate, Status
 from hecbench.report.cells import ABSENT, interval
 from hecbench.report.section import Section
-from hecbench.report.tables import Group, Table, error_mm
+from hecbench.report.tables import Group, Place, Table, error_mm
 
-_FEWEST_LEVELS = 2
-"""Of one level its own table says it."""
+_HEADER = ("level", "first", "TRE median mm [95 %]", "answered", "not distinguished from it")
+_NOTE = (
+    "First: the least median TRE of all runs. Not distinguished from it: solvers of rank 1 whose errors on the same "
+    "recordings do not differ by the signed-rank test (p of 0.05, Bonferroni); more recordings may tell them apart."
+)
 
 
 def summary(groups: Sequence[Group]) -> list[Section]:
-    """One section on these levels; none for fewer than two."""
-    rows = [_row(group) for group in groups if any(e.errors for e in group.estimates)]
-    if len(rows) < _FEWEST_LEVELS:
+    """One section on these levels; none where no level has two solvers to compare."""
+    compared = [group for group in groups if any(e.errors for e in group.estimates) and len(group.places) > 1]
+    if not compared:
         return []
-    note = (
-        "First: the least median TRE of all runs. As good: solvers whose rank is 1 too, since their intervals overlap; "
-        "more recordings may distinguish them."
-    )
-    header = ("level", "first", "as good", "TRE median mm [95 %]", "answered")
-    return [Section(Table("Which solver is first", header, tuple(rows), (note,), left=3))]
+    rows = tuple(_row(group) for group in compared)
+    return [Section(Table("Which solver is first", _HEADER, rows, (_NOTE,), left=len(_HEADER), stacks=True))]
 
 
 def _row(group: Group) -> tuple[str, ...]:
-    runs = group.by_solver
-    medians = {
-        name: statistics.bootstrap([error_mm(run) for run in of_solver], np.median)
-        for name, of_solver in runs.items()
-    }
-    ranks = dict(zip(medians, statistics.shared_ranks(list(medians.values())), strict=True))
-    first, *others = sorted(medians, key=lambda name: (ranks[name], medians[name].value))
-    answered = sum(run.status is Status.OK for run in runs[first])
-    if not answered:
-        return group.title, "none answered", ABSENT, ABSENT, f"0 of {len(runs[first])}"
-    as_good = [name for name in others if ranks[name] == ranks[first]]
-    return (
-        group.title,
-        first,
-        ", ".join(as_good) or ABSENT,
-        interval(medians[first]),
-        f"{answered} of {len(runs[first])}",
-    )
+    first, *others = group.places
+    if not any(run.status is Status.OK for run in first.runs):
+        return group.title, "none answered", ABSENT, first.answered, ABSENT
+    if first.rank is None:
+        like_it = "not known from fewer than 5 runs"
+    else:
+        like_it = ", ".join(
+            _not_distinguished(first, [place for place in others if place.rank == first.rank])
+        )
+    return group.title, first.solver, interval(first.median_mm), first.answered, like_it or ABSENT
+
+
+def _not_distinguished(first: Place, rivals: Sequence[Place]) -> list[str]:
+    reference = _errors_mm(first.runs)
+    names = []
+    for rival in rivals:
+        errors = _errors_mm(rival.runs)
+        shared = sorted(reference.keys() & errors.keys())
+        p = statistics.paired_error_p([reference[key] for key in shared], [errors[key] for key in shared])
+        if not p * len(rivals) < 1 - statistics.CONFIDENCE:
+            names.append(rival.solver)
+    return names
+
+
+def _errors_mm(runs: Sequence[Estimate]) -> dict[str, float]:
+    """The error of each recording."""
+    return {str(run.provenance.get("recording_sha256", run.item)): error_mm(run) for run in runs}

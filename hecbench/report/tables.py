@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 from itertools import groupby
 
 import numpy as np
@@ -21,7 +22,8 @@ SUCCESS_MM, SUCCESS_RAD = 5.0, 0.01
 class Table:
     """Cells as text. The first `left` columns are words, the rest numbers; `looks` are names of styles, one a row.
 
-    The columns named in `secondary` are shown on the page when they are asked for.
+    The columns named in `secondary` are shown on the page when they are asked for. Rows of a table that `stacks` are
+    blocks of lines on a narrow screen.
     """
 
     title: str
@@ -31,6 +33,22 @@ class Table:
     left: int = 1
     looks: tuple[str, ...] = ()
     secondary: frozenset[str] = frozenset()
+    stacks: bool = False
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a solver stands on a level. No rank where the median has no interval."""
+
+    solver: str
+    runs: tuple[Estimate, ...]
+    median_mm: Interval
+    rank: int | None
+
+    @property
+    def answered(self) -> str:
+        """How many of its runs have an answer."""
+        return f"{sum(run.status is Status.OK for run in self.runs)} of {len(self.runs)}"
 
 
 @dataclass(frozen=True)
@@ -46,6 +64,21 @@ class Group:
         """The estimates of each solver, by name."""
         ordered = sorted(self.estimates, key=lambda e: e.solver)
         return {solver: list(group) for solver, group in groupby(ordered, key=lambda e: e.solver)}
+
+    @cached_property
+    def places(self) -> list[Place]:
+        """The solvers of a level by rank and median TRE, best first."""
+        medians = {
+            solver: statistics.bootstrap([error_mm(run) for run in runs], np.median)
+            for solver, runs in self.by_solver.items()
+        }
+        known = [solver for solver, median in medians.items() if not np.isnan(median.low)]
+        ranks = dict(zip(known, statistics.shared_ranks([medians[solver] for solver in known]), strict=True))
+        places = [
+            Place(solver, tuple(self.by_solver[solver]), median, ranks.get(solver))
+            for solver, median in medians.items()
+        ]
+        return sorted(places, key=lambda place: (place.rank or len(places) + 1, place.median_mm.value))
 
 
 def groups(estimates: Iterable[Estimate]) -> list[Group]:
@@ -84,23 +117,18 @@ def succeeded(estimate: Estimate) -> bool:
 
 
 def _level_table(group: Group) -> Table:
-    medians = {
-        solver: statistics.bootstrap([error_mm(run) for run in runs], np.median)
-        for solver, runs in group.by_solver.items()
-    }
-    ranks = dict(zip(medians, statistics.shared_ranks(list(medians.values())), strict=True))
     rows = []
-    for solver in sorted(medians, key=lambda s: (ranks[s], medians[s].value)):
-        runs = group.by_solver[solver]
-        answered = [run for run in runs if run.status is Status.OK]
+    for place in group.places:
+        runs = place.runs
+        answers_mm = [error_mm(run) for run in runs if run.status is Status.OK]
         successes = sum(map(succeeded, runs))
         rows.append(
             (
-                solver,
-                str(ranks[solver]),
-                f"{len(answered)} of {len(runs)}",
-                interval(medians[solver]),
-                number(np.mean([error_mm(run) for run in answered]) if answered else np.nan),
+                place.solver,
+                ABSENT if place.rank is None else str(place.rank),
+                interval(place.median_mm),
+                place.answered,
+                number(np.mean(answers_mm) if answers_mm else np.nan),
                 number(np.median([error_mm(run, "translation_error_mm") for run in runs])),
                 number(np.median([error_mm(run, "rotation_error_deg") for run in runs])),
                 f"{successes}/{len(runs)} {percent(statistics.wilson(successes, len(runs)))}",
@@ -112,8 +140,8 @@ def _level_table(group: Group) -> Table:
         (
             "solver",
             "rank",
-            "answered",
             "TRE median mm [95 %]",
+            "answered",
             "TRE mean mm",
             "camera centre median mm",
             "rotation median deg",
@@ -123,7 +151,8 @@ def _level_table(group: Group) -> Table:
         tuple(rows),
         (
             "TRE: rms displacement of workspace points. Medians and rates count every run, one without an "
-            "answer as infinitely wrong; the mean is over the answers. Ranks are shared where intervals overlap.",
+            "answer as infinitely wrong; the mean is over the answers. Ranks are shared where intervals overlap; "
+            "fewer than 5 runs have neither.",
             *_reasons(group.estimates),
             *not_as_published(group.estimates),
         ),

@@ -84,8 +84,23 @@ def test_a_study_says_first_who_is_first(study, screen):
     assert "tag_2m" in first
     assert "board_2m" in first
     assert 0 < screen.bottom("section") <= 800
-    panels = "return document.querySelector('figure svg').querySelectorAll('g[id^=axes]').length"
-    assert screen.run(panels) >= 13
+    assert len(screen.run("return [...document.querySelector('.panels').querySelectorAll('p')]")) == 13
+
+
+@pytest.mark.parametrize("width", WIDTHS)
+def test_the_numbers_of_a_study_are_seen_without_sideways_scrolling(study, screen, width):
+    screen.at_size(width, 800)
+    screen.open(study)
+    rights = screen.run(
+        "return [...document.querySelectorAll('section:first-of-type td'),"
+        "  ...document.querySelectorAll('section:nth-of-type(2) tr > :nth-child(3)')]"
+        "  .map(cell => { const range = document.createRange(); range.selectNodeContents(cell);"
+        "    return range.getBoundingClientRect().right; })"
+    )
+    assert len(rights) > 20
+    assert max(rights) <= width
+    text = "return [...document.querySelectorAll('.panels text')].map(t => t.getBoundingClientRect().height)"
+    assert min(screen.run(text)) >= 8
 
 
 def test_trials_of_one_task_mention_no_other(trials):
