@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -111,15 +112,14 @@ def pose_conventions(
                 faults.append(str(error))
                 continue
             unusual = rotation is None and name not in assumed
-            for (length, rare), inverse in (
-                (u, i) for u in units for i in ((False, True) if inverted is None else (inverted,))
-            ):
+            ways = (False, True) if inverted is None else (inverted,)
+            for (length, rare), inverse in product(units, ways):
                 a, b = frames[::-1] if inverse else frames
                 scaled = poses.copy()
                 scaled[:, :3, 3] *= UNITS_M[length]
-                wrong_way = inverted is None and inverse != assumed_inverted
                 text = f"{a}_T_{b} {name} in {length}{order}"
                 poses_m = se3.inverse(scaled) if inverse else scaled
+                wrong_way = inverted is None and inverse != assumed_inverted
                 deviations = unusual + wrong_way + rare + bool(order)
                 found.append(PoseConvention(poses_m, text, deviations, unusual=bool(order)))
     if not found:

@@ -92,11 +92,11 @@ def remarks(runs: Sequence[Estimate], option: str) -> list[Remark]:
         said.append(Remark(verdict, text + (f" ({', '.join(inside)})." if inside else ".")))
     if said:
         same = [paper.ABLATIONS[other][1][paper.DEFAULTS[other]][0] for other in paper.ABLATIONS]
-        told = ", ".join(f"{mm:g}" for mm in same)
+        listed = ", ".join(f"{mm:g}" for mm in same)
         said.append(
             Remark(
                 Verdict.WHY,
-                f"The paper's default settings stand in its three tables with {told} mm, each a mean of "
+                f"The paper's default settings stand in its three tables with {listed} mm, each a mean of "
                 f"{paper.ABLATION_RUNS} runs: a factor of {max(same) / min(same):.1f} between its entries is chance.",
             )
         )

@@ -56,12 +56,12 @@ def progress_curves(runs: Sequence[Estimate], levels: Sequence[str]) -> str | No
 def _bands(
     runs: Sequence[Estimate],
     levels: Sequence[str],
-    told: Callable[[Estimate], Array | None],
+    curve_of: Callable[[Estimate], Array | None],
     label: str,
 ) -> str | None:
     """One panel per level: the median over runs of what they tell, and the middle half of them."""
     curves = {
-        (level, solver): np.array([_evenly(curve) for curve in map(told, found) if curve is not None])
+        (level, solver): np.array([_evenly(curve) for curve in map(curve_of, found) if curve is not None])
         for level in levels
         for solver, found in by_solver(run for run in runs if run.level == level).items()
     }
@@ -87,8 +87,8 @@ def _bands(
 
 def _evenly(curve: Array) -> Array:
     """A curve at `_POINTS` equal steps."""
-    along, told = np.linspace(0, 1, _POINTS), np.linspace(0, 1, len(curve))
-    return np.asarray(np.interp(along, told, curve))
+    along, known = np.linspace(0, 1, _POINTS), np.linspace(0, 1, len(curve))
+    return np.asarray(np.interp(along, known, curve))
 
 
 def _relative_costs(run: Estimate) -> Array | None:

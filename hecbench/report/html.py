@@ -117,7 +117,7 @@ def page(
 
 
 def _section(group: Group, evidence: Callable[[str], Evidence | None], has_dots: bool) -> Section:
-    """What the page shows of one level or recording; levels of a study are told there and folded here."""
+    """What the page shows of one level or recording; levels of a study are shown there and folded here."""
     drawn = [] if has_dots else figures(group)
     shown = None if group.is_level else evidence(str(group.estimates[0].provenance.get("recording_sha256")))
     best = best_first(group.estimates)

@@ -67,7 +67,7 @@ def _ordered(
         f"{p_value(p)}); the paper has means of {theirs[0]:g} and {theirs[1]:g} mm"
     )
     if p >= SIGNIFICANT:
-        return Remark(Verdict.OPEN, f"{text}: no difference can be told here.")
+        return Remark(Verdict.OPEN, f"{text}: no difference can be shown here.")
     if won > lost:
         return Remark(Verdict.AGREES, f"{text}: the same order.")
     return Remark(Verdict.DIFFERS, f"{text}: the opposite order.")
@@ -110,9 +110,9 @@ def lost_robots(runs: Sequence[Estimate]) -> list[Remark]:
         counts = Counter(map(ending, found))
         if counts[Ending.NEAR] == len(found):
             continue
-        told = ", ".join(f"{counts[each]} {each}" for each in Ending if counts[each])
+        counted = ", ".join(f"{counts[each]} {each}" for each in Ending if counts[each])
         known = known_ends(found)[:, 0]
-        text = f"{solver}: of {len(found)} runs {told}"
+        text = f"{solver}: of {len(found)} runs {counted}"
         if known.sum() > 0:
             share = 100 * known[known > FAR_MM].sum() / known.sum()
             text += f"; ends beyond {FAR_MM:g} mm make {share:.0f} % of the mean"

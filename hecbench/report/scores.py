@@ -122,7 +122,7 @@ class Ending(StrEnum):
     NEAR = "near"
     LOST = "robot lost"
     FAR_IN_FRAME = "far, robot in frame"
-    FAR = "far, not told"
+    FAR = "far, not reported"
     UNKNOWN = "not known"
 
 
@@ -148,10 +148,10 @@ def rate(flags: Iterable[bool]) -> str:
 
 
 def rate_where(runs: Iterable[Estimate], test: Callable[[Estimate], bool | None]) -> str:
-    """The share of those runs that tell, with how many told when not all did."""
-    told = [(run, test(run)) for run in runs]
-    known = [value for _, value in told if value is not None]
-    return rate(known) + (f" of {len(known)}" if known and len(known) < len(told) else "")
+    """The share of those runs that tell, with how many did when not all."""
+    tested = [(run, test(run)) for run in runs]
+    known = [value for _, value in tested if value is not None]
+    return rate(known) + (f" of {len(known)}" if known and len(known) < len(tested) else "")
 
 
 def start_mm(run: Estimate) -> float:
@@ -199,7 +199,7 @@ def not_as_published(runs: Sequence[Estimate]) -> list[str]:
     """For each method that was not run as its authors published it, how often, and the first reason."""
     said = []
     for solver, found in by_solver(runs).items():
-        reasons = [told for run in found if (told := run.diagnostics.get("not_as_published"))]
+        reasons = [reason for run in found if (reason := run.diagnostics.get("not_as_published"))]
         if reasons:
             often = f"in {len(reasons)} of {len(found)} runs"
             said.append(f"{solver} is not the published method {often}, first: {reasons[0]}.")

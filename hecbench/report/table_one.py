@@ -108,13 +108,13 @@ def endings(title: str, runs: Sequence[Estimate]) -> Table:
         looks += [FIRST_LOOK if number == 0 else "" for number in range(len(of_level))]
     far = f"{FAR_MM:g} mm"
     header = (
-        "level", "method", "runs", "near", "robot lost", f"beyond {far}, robot in frame", f"beyond {far}, not told",
+        "level", "method", "runs", "near", "robot lost", f"beyond {far}, robot in frame", f"beyond {far}, not reported",
         "end not known", "iterations used up", f"share of the mean from beyond {far} %",
         "start median mm: near", "start median mm: others", "start decides",
     )  # fmt: skip
     notes = (
-        f"Near: ended within {far} with the robot in the picture, or not told. Robot lost: it left the picture. Start "
-        "decides: the starts of near runs against those of the others (Mann and Whitney 1947, two-sided).",
+        f"Near: ended within {far} with the robot in the picture, or not reported. Robot lost: it left the picture. "
+        "Start decides: the starts of near runs against those of the others (Mann and Whitney 1947, two-sided).",
     )
     return Table(title, header, tuple(rows), notes, left=2, looks=tuple(looks))
 
@@ -160,7 +160,7 @@ def published(title: str, runs: Sequence[Estimate]) -> Table:
             if theirs is None:
                 continue
             ours = mean_mm(found)
-            told = [flag for flag in map(in_frame, found) if flag is not None]
+            known = [flag for flag in map(in_frame, found) if flag is not None]
             rows.append(
                 (
                     level,
@@ -168,9 +168,9 @@ def published(title: str, runs: Sequence[Estimate]) -> Table:
                     interval(ours),
                     number(theirs.mean_mm),
                     stands(theirs.mean_mm, ours.low, ours.high),
-                    rate(told),
+                    rate(known),
                     f"{theirs.success_pct:g}",
-                    _rate_stands(theirs.success_pct, told),
+                    _rate_stands(theirs.success_pct, known),
                     number(seconds_per_1000(found)),
                     number(paper.SECONDS_PER_1000.get(paper_name(solver) or "")),
                 )

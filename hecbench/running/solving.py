@@ -91,8 +91,8 @@ def each_solved(
             with _caller(spec, options) as solve_part:
                 estimate = _measured(solve_part(blind), recording, blind, spec, options, solve_part)
         if prepared.given_iou is not None:
-            told = {**estimate.diagnostics, "masks_iou_given": prepared.given_iou}
-            estimate = replace(estimate, diagnostics=told)
+            diagnostics = {**estimate.diagnostics, "masks_iou_given": prepared.given_iou}
+            estimate = replace(estimate, diagnostics=diagnostics)
         yield replace(estimate, provenance=origin)
 
 

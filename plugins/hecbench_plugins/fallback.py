@@ -1,4 +1,4 @@
-"""Masks where the robot can be told from its background, else the photographs themselves."""
+"""Masks where the robot can be distinguished from its background, else the photographs themselves."""
 
 from __future__ import annotations
 

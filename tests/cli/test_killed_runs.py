@@ -18,9 +18,11 @@ DEADLINE_S = 120
 
 
 def start(out, *more):
+    """A run that Ctrl-C ends, also where these tests run in the background, with that signal ignored."""
     return subprocess.Popen(
         [*COMMAND, *SOLVERS, "--samples", str(ITEMS), "--jobs", "2", "--out", str(out), *more],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )  # fmt: skip
 
 

@@ -90,10 +90,12 @@ def _truth(path: Path, base_T_flange: Array, points_c: Array) -> tuple[Array | N
         return None, f"{path}: {len(points_c)} poses are too few to tell where the camera stands: no truth"
     points_b = se3.transform_points(base_T_flange, np.array([BAXTER_END_EFFECTOR_M]))[:, 0]
     base_T_camera, rms_m = rigid_fit(points_c, points_b)
-    told = f"the arm's kinematics and {len(points_c)} labelled points differ by {1e3 * rms_m:.1f} mm rms"
+    difference = (
+        f"the arm's kinematics and {len(points_c)} labelled points differ by {1e3 * rms_m:.1f} mm rms"
+    )
     if rms_m > _WORST_M:
-        return None, f"{path}: no truth: {told}"
-    return base_T_camera, f"{path}: truth: {told}"
+        return None, f"{path}: no truth: {difference}"
+    return base_T_camera, f"{path}: truth: {difference}"
 
 
 @hookimpl

@@ -185,7 +185,7 @@ def _truth(
 
 
 def _corners(frames: list[_Frame], keypoint: str, camera: CameraModel) -> Array:
-    """(N, 1, 2) px, NaN where the keypoint is outside the picture or not told."""
+    """(N, 1, 2) px, NaN where the keypoint is outside the picture or not given."""
     corners = np.array([[frame.pixels.get(keypoint, np.full(2, np.nan))] for frame in frames])
     with np.errstate(invalid="ignore"):
         outside = (corners < 0) | (corners > [camera.width - 1, camera.height - 1])

@@ -81,8 +81,8 @@ def load(path: Path) -> Recording:
     K = finite(table(read("K.txt").decode("utf-8", "replace"), f"{place}: K.txt"), f"{place}: K.txt", (3, 3))
     truth = None
     if (_TRUTH in names) if not place.is_dir() else (place / _TRUTH).is_file():
-        told = table(read(_TRUTH).decode("utf-8", "replace"), f"{place}: {_TRUTH}")
-        truth = se3.inverse(finite(told, f"{place}: {_TRUTH}", (4, 4)))
+        written = table(read(_TRUTH).decode("utf-8", "replace"), f"{place}: {_TRUTH}")
+        truth = se3.inverse(finite(written, f"{place}: {_TRUTH}", (4, 4)))
     folder = path if path.is_dir() else path.parent
     urdf, notes = urdf_beside(folder, "a Franka Panda")
     images, masks = sources("color", pictures.image), sources("mask", _mask)

@@ -73,9 +73,9 @@ def load(path: Path) -> Recording:
             )
         index = 0
     camera = camera_key(root, info, named or hints.images)
-    told = episode(root, info, index)
+    recorded = episode(root, info, index)
     source = f"{root}: episode {index}"
-    joints, names = _joints(told)
+    joints, names = _joints(recorded)
     robots = sorted(root.glob("*.urdf")) if hints.robot is None else [_robot(root, hints.robot)]
     units = ("rad",) if np.abs(joints).max() < _RADIANS_BELOW else ("deg",)
     reading = joint_readings(joints, names, robots or _of_type(root, info), units)
@@ -84,8 +84,8 @@ def load(path: Path) -> Recording:
         raise InputError(
             f"{source}: its joints fit {fitting}; write robot: NAME or robot: FILE.urdf into {hints_file}"
         )
-    rows = _chosen(joints, told.stamps)
-    images = told.picture(camera, rows)
+    rows = _chosen(joints, recorded.stamps)
+    images = recorded.picture(camera, rows)
     mounting = hints.mounting or (Mounting.EYE_IN_HAND if _ON_HAND.search(camera) else Mounting.EYE_TO_HAND)
     if mounting is Mounting.EYE_TO_HAND and moves(images):
         raise InputError(
@@ -105,8 +105,8 @@ def load(path: Path) -> Recording:
         target=hinted_target(hints, hints_file),
         base_T_flange=chosen.base_T_flange,
         joints_rad=chosen.joints_rad,
-        camera_stamp_s=told.stamps[rows],
-        robot_stamp_s=told.stamps[rows],
+        camera_stamp_s=recorded.stamps[rows],
+        robot_stamp_s=recorded.stamps[rows],
         images=tuple(images),
         folder=root,
         notes=tuple(notes),
@@ -127,10 +127,10 @@ def camera_key(root: Path, info: dict[str, object], wanted: str | None) -> str:
     raise InputError(f"{root}: {reason}: {', '.join(keys) or 'none'}; write images: KEY into {HINTS_NAME}")
 
 
-def _joints(told: Episode) -> tuple[Array, tuple[str, ...]]:
+def _joints(recorded: Episode) -> tuple[Array, tuple[str, ...]]:
     """The state without the gripper's columns."""
-    kept = [i for i, name in enumerate(told.names) if not re.search("grip|finger", name, re.IGNORECASE)]
-    return told.state[:, kept], tuple(told.names[i] for i in kept)
+    kept = [i for i, name in enumerate(recorded.names) if not re.search("grip|finger", name, re.IGNORECASE)]
+    return recorded.state[:, kept], tuple(recorded.names[i] for i in kept)
 
 
 def _robot(root: Path, name: str) -> str | Path:

@@ -47,15 +47,15 @@ def load_beside_pictures(
         hints: of the user, and the file where they stand or would stand.
 
     Raises:
-        InputError: the pictures do not pair with the rows, the target is not told, or no reading is proven.
+        InputError: the pictures do not pair with the rows, the target is not described, or no reading is proven.
     """
     beside = _paired(found, stream, poses, hints)
     camera, notes = _camera(found, beside.images[0], hints)
     notes += _absent(beside)
     target = hinted_target(hints, file) or kalibr.target_in(found.files, notes)
     robots = _robots(found, hints)
-    told = hints.mounting is not None and (hints.robot_rotation is not None or _is_matrix(poses))
-    if target is None and not told:
+    declared = hints.mounting is not None and (hints.robot_rotation is not None or _is_matrix(poses))
+    if target is None and not declared:
         raise InputError(
             f"{found.path}: {len(beside.images)} pictures beside {stream.source} ({stream.found}); "
             f"{seen_target(beside.images)} into {file}"
@@ -73,7 +73,7 @@ def load_beside_pictures(
         folder=found.path if found.path.is_dir() else found.path.parent,
         notes=tuple(notes),
     )
-    return settled(found.path, recording, ways, hints, told and (target is None or len(ways) == 1))
+    return settled(found.path, recording, ways, hints, declared and (target is None or len(ways) == 1))
 
 
 def _ways(beside: Beside, hints: Hints, robots: Sequence[str | Path]) -> list[RobotReading]:

@@ -75,7 +75,7 @@ def find(greys: Sequence[Grey | None], target: AprilTagTarget) -> tuple[AprilTag
     if twice > _MOSTLY * counts[tag_id]:
         raise TargetNotSeen(
             f"target.id: id {tag_id} of {target.family} is seen twice in {twice} of {counts[tag_id]} images: which of "
-            "the two is the target cannot be told; cover one, or print another id"
+            "the two is the target cannot be known; cover one, or print another id"
         )
     resolved = AprilTagTarget(target.family, tag_id, target.size_m)
     return resolved, [found[tag_id][0] if len(found.get(tag_id, ())) == 1 else None for found in seen]

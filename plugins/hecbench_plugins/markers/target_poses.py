@@ -2,7 +2,7 @@
 
 A small planar target seen through a perspective camera has two poses of nearly equal reprojection error
 (Collins and Bartoli 2014, "Infinitesimal plane-based pose estimation", section 4). Which one is right cannot
-be told from one image, but a motion turns hand and target by the same angle whatever the calibration is.
+be known from one image, but a motion turns hand and target by the same angle whatever the calibration is.
 """
 
 from __future__ import annotations

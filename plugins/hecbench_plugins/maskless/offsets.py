@@ -48,7 +48,7 @@ def with_joint_offsets(
     prior = CONTOUR.correlated_points * prior_information(len(offsets))
     lines.learn(pose, step.spacing)
     found = compare(lines, pose, robot, offsets, step, radius_m)
-    for iteration in range(1, 2 * step.rounds + 1):  # noqa: B007 the number of the last is told
+    for iteration in range(1, 2 * step.rounds + 1):  # noqa: B007 the number of the last is reported
         if found.points < CONTOUR.fewest_points:
             break
         A = found.A + np.diag(prior)

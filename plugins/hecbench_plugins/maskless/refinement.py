@@ -67,7 +67,7 @@ def refine_further(
 ) -> Refined:
     """The same from a comparison that was made within `radius_m` already, by the colours found there."""
     pose, found, converged, iteration = start.camera_T_parent, start.last, False, 0
-    for iteration in range(1, step.rounds + 1):  # noqa: B007 the number of the last is told
+    for iteration in range(1, step.rounds + 1):  # noqa: B007 the number of the last is reported
         if found.points < CONTOUR.fewest_points:
             break
         move = np.linalg.solve(found.A + np.diag(CONTOUR.damping * np.diag(found.A) + 1e-9), found.b)

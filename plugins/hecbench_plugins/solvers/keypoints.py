@@ -164,8 +164,8 @@ def _aligned(
         aligned = RenderGN()(ready, rng=rng)
     except (Refusal, SolverFailure) as reason:
         return replace(found, diagnostics={**found.diagnostics, "refined": f"no: {reason}"})
-    told = {**aligned.diagnostics, **found.diagnostics, "refined": "by the masks"}
-    return replace(aligned, diagnostics=told)
+    diagnostics = {**aligned.diagnostics, **found.diagnostics, "refined": "by the masks"}
+    return replace(aligned, diagnostics=diagnostics)
 
 
 def _yes(text: str) -> bool:

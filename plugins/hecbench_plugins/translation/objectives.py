@@ -90,7 +90,7 @@ def _dice(found: Tensor, wanted: Tensor) -> Tensor:
 
 
 def _contrast(nets: nn.ModuleDict, source: Tensor, made: Tensor) -> Tensor:
-    """A place of the made picture shall be told from all other places by the same place of the source (InfoNCE)."""
+    """A place of the made picture is to be known among all others by the same place of the source (InfoNCE)."""
     generator, heads = nets["to_drawn"], nets["heads"]
     features = generator.features(source)  # type: ignore[operator]
     places = PatchHeads.places(features)

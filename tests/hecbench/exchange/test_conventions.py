@@ -1,4 +1,4 @@
-"""Every way of writing pose numbers down is read back, and what cannot be told is refused."""
+"""Every way of writing pose numbers down is read back, and what cannot be known is refused."""
 
 import numpy as np
 import pytest

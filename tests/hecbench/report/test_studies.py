@@ -81,13 +81,14 @@ def test_how_runs_end(run_of):
     row = cells(endings("t", runs), "LP", "drhec_rgb")
     told = [row[name] for name in ("runs", "near", "robot lost", "end not known")]
     assert told == ["20", "10", "6", "1"]
-    assert (row["beyond 100 mm, robot in frame"], row["beyond 100 mm, not told"]) == ("2", "1")
+    assert (row["beyond 100 mm, robot in frame"], row["beyond 100 mm, not reported"]) == ("2", "1")
     assert row["share of the mean from beyond 100 mm %"] == "100"
     assert (row["start median mm: near"], row["start median mm: others"]) == ("84.5", "162")
     assert row["start decides"].startswith("p\u00a0<")
     (remark,) = lost_robots(runs)
     assert (
-        "of 20 runs 10 near, 6 robot lost, 2 far, robot in frame, 1 far, not told, 1 not known" in remark.text
+        "of 20 runs 10 near, 6 robot lost, 2 far, robot in frame, 1 far, not reported, 1 not known"
+        in remark.text
     )
 
 
