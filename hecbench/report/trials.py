@@ -229,7 +229,8 @@ def margins(trials: Sequence[TrialRecord], title: str) -> str:
     axes.set_yticks(range(len(methods)), methods)
     axes.set_xscale("symlog", linthresh=1.0)
     axes.set(xlabel="margin, mm", title=title)
-    axes.legend(frameon=False, loc="center left", bbox_to_anchor=(1.01, 0.5))
+    if axes.lines[:-1]:
+        axes.legend(frameon=False, loc="center left", bbox_to_anchor=(1.01, 0.5))
     axes.grid(True, axis="x", alpha=0.25)
     return svg(figure)
 
