@@ -14,12 +14,11 @@ from hecbench.system import apriltags
 from hecbench.targets import ANY_TAG, AprilTagTarget
 from hecbench_plugins.detection.edges import apart
 from hecbench_plugins.detection.pictures import each, mirrored
+from hecbench_plugins.detection.settings import MARKERS
 
 Grey = NDArray[np.uint8]
 
 FAMILIES = ("tag36h11", "tag25h9", "tag16h5", "tagCircle21h7", "tagStandard41h12")
-
-_MOSTLY = 0.5
 
 
 def tags(grey: Grey, family: str) -> dict[int, Array]:
@@ -72,7 +71,7 @@ def find(greys: Sequence[Grey | None], target: AprilTagTarget) -> tuple[AprilTag
             f"target.id: expected {wanted} of {target.family} in {len(greys)} images, seen: {ids}; {cure}"
         )
     twice = sum(len(found.get(tag_id, ())) > 1 for found in seen)
-    if twice > _MOSTLY * counts[tag_id]:
+    if twice > MARKERS.mostly * counts[tag_id]:
         raise TargetNotSeen(
             f"target.id: id {tag_id} of {target.family} is seen twice in {twice} of {counts[tag_id]} images: which of "
             "the two is the target cannot be known; cover one, or print another id"

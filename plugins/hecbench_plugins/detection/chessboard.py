@@ -10,17 +10,9 @@ from numpy.typing import NDArray
 
 from hecbench.se3 import Array
 from hecbench_plugins.detection.orientation import is_regular, unmirrored
+from hecbench_plugins.detection.settings import CHESSBOARD
 
 Grey = NDArray[np.uint8]
-
-_WINDOW_PX = (2, 10)
-_LEAST_CONTRAST = 1.2
-_INTO_SQUARE = (0.2, 0.3, 0.4)
-"""How far from a corner towards the next ones a square is looked at."""
-_LEAST_CROSSING = 0.2
-"""Of the difference between the squares around a corner: how much lighter the darker light one is than any dark one."""
-_LEAST_HEIGHT_PX = 360
-"""Of the shorter side of the shrunk picture that is searched first; one four times as large takes six times as long."""
 
 
 def corners(grey: Grey, columns: int, rows: int) -> Array | None:
@@ -32,7 +24,7 @@ def corners(grey: Grey, columns: int, rows: int) -> Array | None:
     import cv2
 
     criteria = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 50, 1e-3)
-    shrink = max(1, 2 ** int(np.log2(min(grey.shape) / _LEAST_HEIGHT_PX)))
+    shrink = max(1, 2 ** int(np.log2(min(grey.shape) / CHESSBOARD.least_height_px)))
     for size, thorough in {(shrink, 0): None, (1, 0): None, (1, cv2.CALIB_CB_EXHAUSTIVE): None}:
         small = cv2.resize(grey, None, fx=1 / size, fy=1 / size, interpolation=cv2.INTER_AREA)
         flags = cv2.CALIB_CB_NORMALIZE_IMAGE | thorough
@@ -44,7 +36,7 @@ def corners(grey: Grey, columns: int, rows: int) -> Array | None:
         points = cv2.cornerSubPix(grey, points, (window, window), (-1, -1), criteria)
         grid = unmirrored(np.asarray(points, float).reshape(rows, columns, 2))
         lightness = _first_square_lightness(grey, grid)
-        if is_regular(grid) and abs(lightness) > _LEAST_CONTRAST and _are_crossings(grey, grid):
+        if is_regular(grid) and abs(lightness) > CHESSBOARD.least_contrast and _are_crossings(grey, grid):
             return (grid[::-1, ::-1] if (columns + rows) % 2 and lightness < 0 else grid).reshape(-1, 2)
     return None
 
@@ -52,7 +44,7 @@ def corners(grey: Grey, columns: int, rows: int) -> Array | None:
 def _window(grid: Array) -> int:
     """Half the refinement window, px: half the closest corners' distance, so that it holds one."""
     sides = [np.linalg.norm(np.diff(grid, axis=axis), axis=2).min() for axis in (0, 1)]
-    return int(np.clip(min(sides) / 2, *_WINDOW_PX))
+    return int(np.clip(min(sides) / 2, *CHESSBOARD.window_px))
 
 
 def _are_crossings(grey: Grey, grid: Array) -> bool:
@@ -64,7 +56,8 @@ def _are_crossings(grey: Grey, grid: Array) -> bool:
     squares = np.array(
         [
             np.mean(
-                [_grey_at(grey, grid + share * (x * across + y * down)) for share in _INTO_SQUARE], axis=0
+                [_grey_at(grey, grid + share * (x * across + y * down)) for share in CHESSBOARD.into_square],
+                axis=0,
             )
             for x, y in ((1, 1), (-1, -1), (1, -1), (-1, 1))
         ]
@@ -73,7 +66,7 @@ def _are_crossings(grey: Grey, grid: Array) -> bool:
     sign = first * np.sign(np.median(first * (squares[:2].sum(0) - squares[2:].sum(0))))
     light, dark = np.where(sign > 0, squares[:2], squares[2:]), np.where(sign > 0, squares[2:], squares[:2])
     spread = np.maximum(squares.max(0) - squares.min(0), 1.0)
-    return bool(((light.min(0) - dark.max(0)) / spread > _LEAST_CROSSING).all())
+    return bool(((light.min(0) - dark.max(0)) / spread > CHESSBOARD.least_crossing).all())
 
 
 def _grey_at(grey: Grey, points: Array) -> Array:

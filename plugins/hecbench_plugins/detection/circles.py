@@ -14,11 +14,9 @@ from numpy.typing import NDArray
 
 from hecbench.se3 import Array
 from hecbench_plugins.detection.orientation import is_regular, turned_grids, unmirrored
+from hecbench_plugins.detection.settings import CIRCLES
 
 Grey = NDArray[np.uint8]
-
-_LARGER = 1.25
-_LEAST_AREA_PX = 20.0
 
 
 def centres(grey: Grey, columns: int, rows: int) -> tuple[Array, bool] | None:
@@ -43,7 +41,7 @@ def _blob_detector(cell_px: float) -> Any:
     """
     cv2: Any = import_module("cv2")
     parameters = cv2.SimpleBlobDetector_Params()
-    parameters.minArea, parameters.maxArea = _LEAST_AREA_PX, cell_px / 2
+    parameters.minArea, parameters.maxArea = CIRCLES.least_area_px, cell_px / 2
     parameters.minThreshold, parameters.maxThreshold, parameters.thresholdStep = 20, 220, 10
     parameters.minDistBetweenBlobs = 5
     parameters.filterByInertia = False
@@ -62,5 +60,5 @@ def _first_at_larger_dot(grid: Array, blobs: Any) -> tuple[Array, bool]:
     turned = turned_grids(grid)
     ratios = [2 * size_at(g[0, 0]) / (size_at(g[0, 1]) + size_at(g[1, 0])) for g in turned]
     largest = int(np.argmax(ratios))
-    marked = ratios[largest] > _LARGER
+    marked = ratios[largest] > CIRCLES.larger
     return turned[largest if marked else 0].reshape(-1, 2), marked

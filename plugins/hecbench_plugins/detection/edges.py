@@ -11,18 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench.se3 import Array
-
-_ENDS = 0.15
-"""Share of an edge left out at either end."""
-_STEP_PX = 0.25
-_REACH_PX = (1.5, 4.0)
-"""Half the width that is read, at least and at most; between them, 0.7 of a cell: the next edge is a cell away."""
-_REACH_CELLS = 0.7
-_ROUNDS = 4
-_FARTHEST_PX = 4.0
-"""By which a corner may move in all."""
-_LEAST_CONTRAST = 8.0
-"""Grey levels between the two sides."""
+from hecbench_plugins.detection.settings import EDGES
 
 
 def apart(corners_px: Array, other: Array) -> bool:
@@ -35,15 +24,18 @@ def refined(grey: NDArray[np.uint8], corners_px: Array, cells: int) -> Array | N
     """Corners (4, 2) px, clockwise in the picture, of a black square of `cells` cells a side; None without edges."""
     found = corners_px
     sides = np.linalg.norm(np.roll(corners_px, -1, 0) - corners_px, axis=1)
-    reach = float(np.clip(_REACH_CELLS * sides.min() / cells, *_REACH_PX))
-    for _ in range(_ROUNDS):
+    reach = float(np.clip(EDGES.reach_cells * sides.min() / cells, *EDGES.reach_px))
+    for _ in range(EDGES.rounds):
         edges = (_line(grey, found[i], found[(i + 1) % 4], reach) for i in range(4))
         lines = [line for line in edges if line is not None]
         if len(lines) < 4:
             return None
         crossings = np.array([np.cross(lines[i - 1], lines[i]) for i in range(4)])
         found = crossings[:, :2] / crossings[:, 2:]
-        if not np.isfinite(found).all() or np.linalg.norm(found - corners_px, axis=1).max() > _FARTHEST_PX:
+        if (
+            not np.isfinite(found).all()
+            or np.linalg.norm(found - corners_px, axis=1).max() > EDGES.farthest_px
+        ):
             return None
     return found
 
@@ -56,17 +48,17 @@ def _line(grey: NDArray[np.uint8], start: Array, end: Array, reach: float) -> Ar
     length = float(np.linalg.norm(along))
     direction = along / length
     outward = np.array([direction[1], -direction[0]])
-    places = np.linspace(_ENDS, 1 - _ENDS, max(6, int(length)))
-    offsets = np.arange(-reach, reach + _STEP_PX / 2, _STEP_PX)
+    places = np.linspace(EDGES.ends, 1 - EDGES.ends, max(6, int(length)))
+    offsets = np.arange(-reach, reach + EDGES.step_px / 2, EDGES.step_px)
     points = start + places[:, None, None] * along + offsets[:, None] * outward
     x, y = np.moveaxis(points, -1, 0).astype(np.float32)
     values = np.asarray(cv2.remap(grey, x, y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE), float)
     rise = np.maximum(np.diff(values, axis=1), 0.0)
     weights = rise.sum(1)
-    if np.median(weights) < _LEAST_CONTRAST:
+    if np.median(weights) < EDGES.least_contrast:
         return None
     middles = (offsets[:-1] + offsets[1:]) / 2
-    clear = weights > _LEAST_CONTRAST / 2
+    clear = weights > EDGES.least_contrast / 2
     edge = (rise @ middles)[clear] / weights[clear]
     on_edge = start + places[clear, None] * along + edge[:, None] * outward
     share = weights[clear] / weights[clear].sum()

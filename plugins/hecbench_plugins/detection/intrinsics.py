@@ -18,9 +18,8 @@ from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel
 from hecbench.se3 import Array
+from hecbench_plugins.detection.settings import INTRINSICS
 
-LEAST_IMAGES = 3
-LEAST_POINTS = 6
 TERMS = ("fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3")
 LENSES = (
     (),
@@ -31,23 +30,6 @@ LENSES = (
     ("k1", "k2", "p1", "p2", "k3"),
 )
 """The lens models, by the terms that are free, from the poorest to the richest."""
-_AS_WELL = 1.05
-"""Mean squared error of prediction over that of the best lens."""
-_CORNER_SHARE = 0.01
-"""Standard deviation of what the last radial term moves a point in the picture's corner, over its distance from the
-middle."""
-_FEW_VIEWS_LENS = LENSES[1]
-"""Of fewer views than can be left out in turn."""
-_FOLDS = 5
-_MOST_COMPARED = 20
-"""Views that the lens models are compared on."""
-_MOST_UNCERTAIN = 0.1
-_MOST_UNCERTAIN_CENTRE = 0.02
-"""Standard deviations beyond which the views are said to leave a parameter open: of the focal length, over itself, and
-of the centre, over the picture's width."""
-_LEAST_TILT_RAD = np.deg2rad(8.0)
-_SAME_PX = 0.7
-"""Views whose points lie this near to each other, rms, are one: the arm stood still."""
 
 Views = list[tuple[NDArray[np.float32], NDArray[np.float32]]]
 """Points (P, 3) m and corners (P, 2) px of each view."""
@@ -108,10 +90,10 @@ def calibrate(points_m: Array, corners_px: Array, size: tuple[int, int]) -> Cali
             length or the centre open.
     """
     views = _different(points_m, corners_px)
-    if len(views) < LEAST_IMAGES:
+    if len(views) < INTRINSICS.least_images:
         raise InputError(
-            f"camera.K: is unknown, and {len(views)} images from different poses show {LEAST_POINTS} or more target "
-            f"points; calibrating it takes {LEAST_IMAGES}: give K, or more images"
+            f"camera.K: is unknown, and {len(views)} images from different poses show {INTRINSICS.least_points} or "
+            f"more target points; calibrating it takes {INTRINSICS.least_images}: give K, or more images"
         )
     if (points_m[:, 2] != 0).any():
         raise InputError(
@@ -126,17 +108,17 @@ def calibrate(points_m: Array, corners_px: Array, size: tuple[int, int]) -> Cali
 
 
 def _refuse_undetermined(fit: _Fit, tilt: float, size: tuple[int, int]) -> None:
-    if tilt < _LEAST_TILT_RAD:
+    if tilt < INTRINSICS.least_tilt_rad:
         raise InputError(
             f"camera.K: the views are within {np.rad2deg(tilt):.1f} degrees of each other, which leaves the "
             "focal length open; tilt the target"
         )
     focal, centre = float(fit.sigmas[:2].max()), float(fit.sigmas[2:4].max())
-    if not np.isfinite(fit.K).all() or not focal < _MOST_UNCERTAIN * fit.K[0, 0]:
+    if not np.isfinite(fit.K).all() or not focal < INTRINSICS.most_uncertain * fit.K[0, 0]:
         raise InputError(
             f"camera.K: the views leave the focal length at {fit.K[0, 0]:.0f} +- {focal:.0f} px; tilt the target"
         )
-    if not centre < _MOST_UNCERTAIN_CENTRE * size[0]:
+    if not centre < INTRINSICS.most_uncertain_centre * size[0]:
         raise InputError(
             f"camera.K: the views leave the centre at ({fit.K[0, 2]:.0f}, {fit.K[1, 2]:.0f}) +- {centre:.0f} px; tilt "
             "the target to all sides, and show it in the picture's corners too"
@@ -147,7 +129,7 @@ def _different(points_m: Array, corners_px: Array) -> Views:
     """The views that show enough of the target, one of those in which it stands still."""
     kept: list[Array] = []
     for corners in corners_px:
-        if np.isfinite(corners[:, 0]).sum() >= LEAST_POINTS and not any(
+        if np.isfinite(corners[:, 0]).sum() >= INTRINSICS.least_points and not any(
             _same(corners, other) for other in kept
         ):
             kept.append(corners)
@@ -161,18 +143,24 @@ def _different(points_m: Array, corners_px: Array) -> Views:
 def _same(corners: Array, other: Array) -> bool:
     squares = ((corners - other) ** 2).sum(1)
     both = np.isfinite(squares)
-    return bool(both.any() and np.sqrt(squares[both].mean()) < _SAME_PX)
+    return bool(both.any() and np.sqrt(squares[both].mean()) < INTRINSICS.same_px)
 
 
 def _lens(views: Views, size: tuple[int, int]) -> tuple[str, ...]:
     """The richest lens that predicts left-out views as well as any, and is known up to the corners."""
-    if len(views) < _FOLDS:
-        return _FEW_VIEWS_LENS
-    chosen = np.unique(np.linspace(0, len(views) - 1, _MOST_COMPARED).round().astype(int))
+    if len(views) < INTRINSICS.folds:
+        return INTRINSICS.few_views_lens
+    chosen = np.unique(np.linspace(0, len(views) - 1, INTRINSICS.most_compared).round().astype(int))
     compared = [views[i] for i in chosen]
     errors = [float(_predicted(compared, size, lens).mean()) for lens in LENSES]
-    good = [lens for lens, error in zip(LENSES, errors, strict=True) if error <= _AS_WELL * min(errors)]
-    known = [lens for lens in good if _corner_sigma(_fitted(views, size, lens), lens, size) < _CORNER_SHARE]
+    good = [
+        lens for lens, error in zip(LENSES, errors, strict=True) if error <= INTRINSICS.as_well * min(errors)
+    ]
+    known = [
+        lens
+        for lens in good
+        if _corner_sigma(_fitted(views, size, lens), lens, size) < INTRINSICS.corner_share
+    ]
     return known[-1] if known else good[0]
 
 
@@ -190,10 +178,10 @@ def _predicted(views: Views, size: tuple[int, int], lens: tuple[str, ...]) -> Ar
     import cv2
 
     errors = np.full(len(views), np.inf)
-    for fold in range(_FOLDS):
-        left_out = range(fold, len(views), _FOLDS)
+    for fold in range(INTRINSICS.folds):
+        left_out = range(fold, len(views), INTRINSICS.folds)
         try:
-            fit = _fitted([view for i, view in enumerate(views) if i % _FOLDS != fold], size, lens)
+            fit = _fitted([view for i, view in enumerate(views) if i % INTRINSICS.folds != fold], size, lens)
         except InputError:
             continue
         for i in left_out:

@@ -20,18 +20,10 @@ from hecbench.targets import AprilGridTarget, ArucoGridTarget, ArucoTarget, Mark
 from hecbench_plugins.detection.dictionaries import named, shown_in
 from hecbench_plugins.detection.edges import apart, refined
 from hecbench_plugins.detection.pictures import each, mirrored
+from hecbench_plugins.detection.settings import MARKERS
 
 Grey = NDArray[np.uint8]
 Sightings = list[dict[int, Array]]
-
-_BORDERS = (1, 2)
-"""Cells of a marker's black border: OpenCV's and the AprilTag library's, and Kalibr's."""
-_WIDENINGS_PX = (1, 3)
-"""By which the white is widened: not at all, and so that squares that touch come apart."""
-_PLACED = 0.12
-"""Sides of a marker by which its corners may miss the grid: more than a lens bends it, less than any other layout."""
-_WELL_PLACED = 0.8
-"""Share of the markers seen that must lie where the layout has them."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +49,7 @@ def find(greys: Sequence[Grey | None], target: MarkersTarget) -> tuple[MarkersTa
         kept = [_placed(found, layout) for found in seen]
         shown = sum(map(len, kept))
         wanted = sum(number in _range(layout.target) for found in seen for number in found)
-        if shown and shown >= _WELL_PLACED * wanted:
+        if shown and shown >= MARKERS.well_placed * wanted:
             return layout.target, [_corners(found, layout) for found in kept]
     raise TargetNotSeen(f"target: no image shows the {target.kind}; {_other_layout(seen, ids, target)}")
 
@@ -77,7 +69,7 @@ def _range(target: MarkersTarget) -> range:
 def _sightings(greys: Sequence[Grey | None], dictionary: str) -> Sightings:
     """Corners (4, 2) px by id of every picture, read with the border that shows more markers."""
     named(dictionary)
-    ways = [[found or {} for found in each(greys, markers, dictionary, border)] for border in _BORDERS]
+    ways = [[found or {} for found in each(greys, markers, dictionary, border)] for border in MARKERS.borders]
     return max(ways, key=lambda way: sum(map(len, way)))
 
 
@@ -90,7 +82,7 @@ def markers(grey: Grey, dictionary: str, border: int) -> dict[int, Array]:
     known = named(dictionary)
     detector, cells = cv2.aruco.ArucoDetector(known, parameters), known.markerSize + 2 * border
     by_id: dict[int, list[Array]] = {}
-    for width in _WIDENINGS_PX:
+    for width in MARKERS.widenings_px:
         picture = np.asarray(cv2.dilate(grey, np.ones((width, width), np.uint8)), np.uint8)
         quads, ids, _ = detector.detectMarkers(picture)
         for number, quad in zip([] if ids is None else np.ravel(ids).tolist(), quads, strict=True):
@@ -127,7 +119,7 @@ def _placed(found: dict[int, Array], layout: Layout) -> dict[int, Array]:
         return ours if layout.target.marker_count == 1 else {}
     plane = np.concatenate([_points(layout, number) for number in ours])
     pixels = np.concatenate([_listed(corners, layout) for corners in ours.values()])
-    limits = {number: _PLACED * _side(corners) for number, corners in ours.items()}
+    limits = {number: MARKERS.placed * _side(corners) for number, corners in ours.items()}
     H, _ = cv2.findHomography(plane, pixels, cv2.RANSAC, float(np.median(list(limits.values()))))
     if H is None:
         return {}
@@ -148,7 +140,7 @@ def _corners(found: dict[int, Array], layout: Layout) -> Array | None:
 
 
 def _cause(greys: Sequence[Grey | None], target: MarkersTarget) -> str:
-    if note := mirrored(greys, markers, target.dictionary, _BORDERS[0]):
+    if note := mirrored(greys, markers, target.dictionary, MARKERS.borders[0]):
         return note.removeprefix("; ")
     return shown_in(greys, target.dictionary)
 
@@ -165,7 +157,7 @@ def _other_layout(seen: Sightings, ids: list[int], target: MarkersTarget) -> str
         other = replace(target, columns=columns, rows=rows, first_id=ids[0])
         for turn in range(4):
             placed = [_placed(found, Layout(other, turn)) for found in seen]
-            if sum(map(len, placed)) >= _WELL_PLACED * sum(map(len, seen)):
+            if sum(map(len, placed)) >= MARKERS.well_placed * sum(map(len, seen)):
                 return (
                     f"{shown}, as a grid of {columns} columns, not {target.columns}: count columns and rows"
                 )

@@ -12,10 +12,7 @@ from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.se3 import Array
-
-_ANGLE_SIGMA_RAD = np.deg2rad(2.0)
-_ROBUST_LIMIT = 25.0
-_IRREGULAR = 0.15
+from hecbench_plugins.detection.settings import ORIENTATION
 
 
 def unmirrored(grid: Array) -> Array:
@@ -41,7 +38,7 @@ def is_regular(grid: Array) -> bool:
     fitted = np.stack([u, v, one], 1) @ H.T
     gaps = (fitted[:, :2] / fitted[:, 2:] - np.stack([x, y], 1)) * scale
     cells = [np.linalg.norm(np.diff(grid, axis=axis), axis=2).min() for axis in (0, 1)]
-    return bool(np.sqrt((gaps**2).sum(1).mean()) < _IRREGULAR * min(cells))
+    return bool(np.sqrt((gaps**2).sum(1).mean()) < ORIENTATION.irregular * min(cells))
 
 
 def turned_grids(grid: Array) -> list[Array]:
@@ -66,8 +63,8 @@ def choose_turns(hand: Array, candidates: Array) -> NDArray[np.int64]:
     count, ways = candidates.shape[:2]
     hand_angles = se3.rotation_error_rad(hand[:, None], hand[None])
     angles = se3.rotation_error_rad(candidates[:, :, None, None], candidates[None, None])
-    gaps = (angles - hand_angles[:, None, :, None]) / _ANGLE_SIGMA_RAD
-    cost = np.nan_to_num(np.minimum(gaps**2, _ROBUST_LIMIT), nan=_ROBUST_LIMIT)
+    gaps = (angles - hand_angles[:, None, :, None]) / ORIENTATION.angle_sigma_rad
+    cost = np.nan_to_num(np.minimum(gaps**2, ORIENTATION.robust_limit), nan=ORIENTATION.robust_limit)
     each = np.arange(count)
     cost[each, :, each, :] = 0.0
 

@@ -22,7 +22,8 @@ from hecbench.robots.posed import PosedRobot
 from hecbench.se3 import Array
 from hecbench.specs import EvaluatorSpec, Need, ResultSection
 from hecbench.targets import PointsTarget
-from hecbench_plugins.markers.target_poses import MINIMUM_POINTS, project
+from hecbench_plugins.markers.settings import TARGET_POSES
+from hecbench_plugins.markers.target_poses import project
 
 THRESHOLDS_PX = (20, 30, 40, 50, 100, 150, 200)
 _AREA_PX, _BAXTER_AREA_MM, _DREAM_AREA_MM = 200, 400, 100
@@ -36,7 +37,7 @@ def has_keypoints(recording: Recording) -> bool:
     target = recording.target
     return (
         isinstance(target, PointsTarget)
-        and len(target.points_m) < MINIMUM_POINTS
+        and len(target.points_m) < TARGET_POSES.least_points
         and {Need.CORNERS, Need.INTRINSICS} <= recording.offers()
         and recording.base_T_flange is not None
     )

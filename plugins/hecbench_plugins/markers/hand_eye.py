@@ -21,15 +21,8 @@ from hecbench.recording import Recording
 from hecbench.samples.agreement import contradiction
 from hecbench.samples.standstills import one_per_robot_pose
 from hecbench.se3 import Array
+from hecbench_plugins.markers.settings import HAND_EYE
 from hecbench_plugins.markers.target_poses import target_poses
-
-MINIMUM_SAMPLES = 3
-_MOST_COMPARED = 800
-"""Samples whose motions are all formed: their number, and OpenCV's time, grow with the square."""
-MINIMUM_ROTATION_DEG = 1.0
-"""Rms rotation that must remain about a second axis, ten times a good robot's noise, or nothing is
-observable.
-"""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,9 +47,9 @@ class PosedSamples:
     @cached_property
     def compared(self) -> PosedSamples:
         """The samples whose motions are formed: these, or 800 evenly spread ones of more."""
-        if len(self) <= _MOST_COMPARED:
+        if len(self) <= HAND_EYE.most_compared:
             return self
-        return self.subset(np.linspace(0, len(self) - 1, _MOST_COMPARED).astype(int))
+        return self.subset(np.linspace(0, len(self) - 1, HAND_EYE.most_compared).astype(int))
 
     @cached_property
     def motions(self) -> tuple[Array, Array]:
@@ -100,11 +93,11 @@ def posed_samples(recording: Recording) -> tuple[Array, Array]:
     posed = posed.subset(np.flatnonzero(both)) if both.any() else posed
     once = one_per_robot_pose(posed)
     both = _both(once)
-    if both.sum() < MINIMUM_SAMPLES <= len(posed):
+    if both.sum() < HAND_EYE.least_samples <= len(posed):
         raise Refusal(f"the hand hardly rotates: {len(posed)} samples stand at {both.sum()} robot poses")
-    if both.sum() < MINIMUM_SAMPLES:
+    if both.sum() < HAND_EYE.least_samples:
         raise Refusal(
-            f"{both.sum()} samples have a robot and a target pose; at least {MINIMUM_SAMPLES} are needed"
+            f"{both.sum()} samples have a robot and a target pose; at least {HAND_EYE.least_samples} are needed"
         )
     return once.hand_poses()[both], once.present.camera_T_target[both]
 
@@ -128,15 +121,15 @@ def require_two_rotation_axes(pairs: PosedSamples) -> None:
     With one axis only, the translation along it is unobservable to every method (Tsai and Lenz 1989, section
     III).
     """
-    if len(pairs) < MINIMUM_SAMPLES:
-        raise Refusal(f"{len(pairs)} samples are left; at least {MINIMUM_SAMPLES} are needed")
+    if len(pairs) < HAND_EYE.least_samples:
+        raise Refusal(f"{len(pairs)} samples are left; at least {HAND_EYE.least_samples} are needed")
     for name, logs in zip(("hand", "target"), pairs.rotation_logs, strict=True):
         first, second, _ = np.append(rotation_diversity_deg(logs), 0.0)[:3]
-        if first < MINIMUM_ROTATION_DEG:
+        if first < HAND_EYE.least_rotation_deg:
             raise Refusal(
                 f"the {name} hardly rotates ({first:.2g} deg rms): tilt it by 20 deg or more between samples"
             )
-        if second < MINIMUM_ROTATION_DEG:
+        if second < HAND_EYE.least_rotation_deg:
             raise Refusal(
                 f"the {name} rotates about one axis only ({first:.3g} deg rms, {second:.2g} about others): "
                 "add samples turned about a second axis"

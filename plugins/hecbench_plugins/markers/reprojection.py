@@ -19,16 +19,11 @@ from hecbench.se3 import Array
 from hecbench_plugins.markers import single3d
 from hecbench_plugins.markers.hand_eye import pose_pairs
 from hecbench_plugins.markers.opencv_hand_eye import robot_world
+from hecbench_plugins.markers.settings import ADJUSTMENT_STARTS
 from hecbench_plugins.markers.target_poses import planar_candidates
 
 DEFAULT_NOISE = Noise(0.3, float(np.deg2rad(0.05)), 5e-4)
 """A corner, and a good arm: px, rad, m."""
-_STARTS = 2
-"""Descents, from the starts with the least residuals."""
-_MOST_VOTES = 400
-"""Poses compared each with each."""
-_AGREEING_RAD = np.deg2rad(8.0)
-"""Between turns of the target that agree: PnP of a small target is off by degrees, a mirrored pose by tens."""
 
 
 def corner_problem(recording: Recording, prior_sigmas: Array | None = None) -> Problem:
@@ -73,7 +68,7 @@ def adjust_with_exact_robot(recording: Recording, problem: Problem) -> Solution:
     starts = sorted(_starts(recording, problem), key=lambda state: linearise(problem, state, noise).cost)
     if not starts:
         raise Refusal("neither single3d nor shah gives a start on this recording")
-    found = [adjust(problem, state, noise) for state in starts[:_STARTS]]
+    found = [adjust(problem, state, noise) for state in starts[: ADJUSTMENT_STARTS.starts]]
     best = min(found, key=lambda solution: solution.at.cost)
     centres_px = np.nanmean(problem.observed, axis=1)
     left_px = np.linalg.norm(best.at.residuals[problem.seen], axis=1)
@@ -117,11 +112,11 @@ def _by_shah(recording: Recording) -> Array:
 
 def _most_agreed(poses: Array) -> list[Array]:
     """Of poses (M, 4, 4), the one whose rotation most others share, and the best one unlike it."""
-    poses = poses[:: 1 + len(poses) // _MOST_VOTES]
+    poses = poses[:: 1 + len(poses) // ADJUSTMENT_STARTS.most_votes]
     angles = se3.rotation_error_rad(poses[:, None], poses)
-    loneliness = np.minimum(angles, _AGREEING_RAD).sum(1)
+    loneliness = np.minimum(angles, ADJUSTMENT_STARTS.agreeing_rad).sum(1)
     first = int(loneliness.argmin())
-    unlike = np.flatnonzero(angles[first] > _AGREEING_RAD)
+    unlike = np.flatnonzero(angles[first] > ADJUSTMENT_STARTS.agreeing_rad)
     chosen = [first, *unlike[loneliness[unlike].argsort()[:1]]]
     offset = np.median(poses[:, :3, 3], axis=0)
     return [se3.make(poses[i, :3, :3], offset) for i in chosen]

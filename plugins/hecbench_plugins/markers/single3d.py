@@ -19,30 +19,8 @@ from hecbench.estimate import Estimate, Termination
 from hecbench.recording import Recording
 from hecbench.samples.agreement import LARGEST_SHARE, percent, share_left
 from hecbench.se3 import Array
-from hecbench_plugins.markers.hand_eye import MINIMUM_ROTATION_DEG, posed_samples, rotation_diversity_deg
-
-COPLANAR_CONDITION = 300.0
-"""Above it the marker positions nearly lie in a plane and the closed form is off by decimetres; healthy is 5."""
-_MOST_COMPARED = 400
-"""Samples compared each with each."""
-
-
-@dataclass(frozen=True)
-class DescentSettings:
-    """When the Gauss-Newton descent ends.
-
-    Attributes:
-        iterations: at most.
-        least_step_rad: length of a step below which it has converged.
-        rounding: relative rise of the cost that is rounding, no reason to halve a step.
-    """
-
-    iterations: int = 100
-    least_step_rad: float = 1e-11
-    rounding: float = 1e-13
-
-
-DESCENT = DescentSettings()
+from hecbench_plugins.markers.hand_eye import posed_samples, rotation_diversity_deg
+from hecbench_plugins.markers.settings import HAND_EYE, SINGLE3D, Single3dSettings
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,11 +96,11 @@ def marker_positions(recording: Recording) -> MarkerPositions:
     """
     chosen, camera_T_target = posed_samples(recording)
     marker = np.zeros(3) if recording.target is None else recording.target.points_m.mean(0)
-    some = chosen[:: 1 + len(chosen) // _MOST_COMPARED, :3, :3]
+    some = chosen[:: 1 + len(chosen) // SINGLE3D.most_compared, :3, :3]
     i, j = np.triu_indices(len(some), 1)
     logs = se3.so3_log(np.swapaxes(some[i], 1, 2) @ some[j])
     diversity_deg = rotation_diversity_deg(logs)
-    if diversity_deg[1] < MINIMUM_ROTATION_DEG:
+    if diversity_deg[1] < HAND_EYE.least_rotation_deg:
         raise Refusal(
             f"the hand rotates by {diversity_deg[0]:.3g} deg rms about one axis and {diversity_deg[1]:.2g} "
             "about any other: add samples turned by 20 deg or more about a second axis"
@@ -166,7 +144,7 @@ def _cost(e: Eliminated, rotation: Array) -> float:
     return float(columns @ e.A @ columns - 2 * e.b @ columns)
 
 
-def _descend(e: Eliminated, rotation: Array, settings: DescentSettings = DESCENT) -> tuple[Array, int]:
+def _descend(e: Eliminated, rotation: Array, settings: Single3dSettings = SINGLE3D) -> tuple[Array, int]:
     """Gauss-Newton from a start; a step that would raise the cost, beyond rounding, is halved."""
     for iteration in range(1, settings.iterations + 1):
         F = np.stack([_vec(rotation @ generator) for generator in se3.hat(np.eye(3))], 1)
@@ -202,7 +180,7 @@ def to_estimate(
         "samples": len(positions.hand),
         "position_rms_mm": 1e3 * left_m,
         "coplanarity_condition": condition,
-        "nearly_coplanar": condition > COPLANAR_CONDITION,
+        "nearly_coplanar": condition > SINGLE3D.coplanar_condition,
     }
     return Estimate(
         parent_T_camera,

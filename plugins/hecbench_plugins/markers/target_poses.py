@@ -17,15 +17,7 @@ from hecbench.lens import FixedSensor, normalised
 from hecbench.recording import CameraModel, Recording
 from hecbench.se3 import Array
 from hecbench.targets import Target
-
-MINIMUM_POINTS = 4
-_PIXEL_SIGMA_PX = 0.5
-_ANGLE_SIGMA_RAD = np.deg2rad(1.0)
-_ROBUST_LIMIT = 25.0
-"""A pair of samples costs at most (5 sigma)^2, so that one bad robot pose does not decide for the others."""
-_COMPARED = 60
-"""Samples whose poses are chosen by all their pairs; any others are chosen against these, so that time grows with
-their number only."""
+from hecbench_plugins.markers.settings import TARGET_POSES
 
 
 def target_poses(recording: Recording) -> Array:
@@ -39,13 +31,13 @@ def target_poses(recording: Recording) -> Array:
     poses, errors_px = planar_candidates(recording)
     seen = np.isfinite(poses[:, 0]).all((1, 2))
     if not seen.any():
-        raise Refusal(f"no sample shows {MINIMUM_POINTS} or more target points")
+        raise Refusal(f"no sample shows {TARGET_POSES.least_points} or more target points")
     choice = np.zeros(len(recording), int)
     if recording.base_T_flange is not None and recording.corners_px is not None:
         hand = recording.hand_poses()
         decidable = seen & np.isfinite(hand).all((1, 2))
         points = np.isfinite(recording.corners_px).all(-1).sum(-1)
-        misfit = points[:, None] * (errors_px / _PIXEL_SIGMA_PX) ** 2
+        misfit = points[:, None] * (errors_px / TARGET_POSES.pixel_sigma_px) ** 2
         choice[decidable] = choose_by_motion(hand[decidable], poses[decidable], misfit[decidable])
     return poses[np.arange(len(recording)), choice]
 
@@ -91,7 +83,7 @@ def _starts(target: Target, ideal: Array) -> list[Array]:
     import cv2
 
     seen = np.isfinite(ideal).all(1)
-    if seen.sum() < MINIMUM_POINTS:
+    if seen.sum() < TARGET_POSES.least_points:
         return []
     method = cv2.SOLVEPNP_IPPE if target.is_planar else cv2.SOLVEPNP_SQPNP
     try:
@@ -119,7 +111,7 @@ def choose_by_motion(hand: Array, candidates: Array, misfit: Array) -> NDArray[n
     Returns:
         (N,) of 0 or 1.
     """
-    some = np.unique(np.linspace(0, len(hand) - 1, min(len(hand), _COMPARED)).astype(int))
+    some = np.unique(np.linspace(0, len(hand) - 1, min(len(hand), TARGET_POSES.compared)).astype(int))
     pair_cost = _motion_costs(hand, candidates, some)
     chosen = _chosen_together(misfit[some], pair_cost[some])
     costs = misfit + pair_cost[:, :, np.arange(len(some)), chosen].sum(2)
@@ -162,8 +154,8 @@ def _motion_costs(hand: Array, candidates: Array, others: NDArray[np.int64]) -> 
     target_angles = _angles_between(
         rotations.reshape(2 * count, 3, 3), rotations[others].reshape(2 * compared, 3, 3)
     ).reshape(count, 2, compared, 2)
-    difference = (target_angles - hand_angles[:, None, :, None]) / _ANGLE_SIGMA_RAD
-    costs = np.minimum(difference**2, _ROBUST_LIMIT)
+    difference = (target_angles - hand_angles[:, None, :, None]) / TARGET_POSES.angle_sigma_rad
+    costs = np.minimum(difference**2, TARGET_POSES.robust_limit)
     costs[others, :, np.arange(compared), :] = 0.0
     return np.asarray(costs)
 

@@ -11,15 +11,8 @@ from numpy.typing import NDArray
 from hecbench import se3
 from hecbench.errors import SolverFailure
 from hecbench.se3 import Array
+from hecbench_plugins.perception.settings import POSE
 
-_MINIMAL_POINTS = 4
-_CONFIDENCE = 0.9999
-_NEAR_M = 0.05
-"""Points nearer to the camera than this count as that near."""
-_STILL_M = 0.03
-"""A keypoint that moves less than this between two views stands still."""
-_ROBUST = 0.15
-"""Of the limit: residuals beyond it count less (Cauchy)."""
 REFERENCE_WIDTH_PX = 640
 
 
@@ -52,7 +45,7 @@ def independent(seen: Sightings) -> Sightings:
     picture of it again, and errs in the same way: n such sightings share the weight of one and are one cluster.
     """
     apart = np.linalg.norm(seen.points[:, None] - seen.points[None], axis=2)
-    same = (apart < _STILL_M) & (seen.keypoint[:, None] == seen.keypoint[None])
+    same = (apart < POSE.still_m) & (seen.keypoint[:, None] == seen.keypoint[None])
     count = same.sum(1)
     first = same.argmax(1)
     cluster = np.where(count > 1, -1 - first, seen.cluster)
@@ -87,7 +80,7 @@ def consensus(seen: Sightings, limit: float, rounds: int, rng: np.random.Generat
 
     best, best_score = None, -1.0
     for _ in range(rounds):
-        chosen = rng.choice(len(seen.points), _MINIMAL_POINTS, replace=False)
+        chosen = rng.choice(len(seen.points), POSE.minimal_points, replace=False)
         ok, rotation, translation = cv2.solvePnP(
             seen.points[chosen], seen.rays[chosen], np.eye(3), None, flags=cv2.SOLVEPNP_AP3P
         )
@@ -112,8 +105,8 @@ def refined(seen: Sightings, camera_T_parent: Array, limit: float) -> KeypointPo
     from scipy.optimize import least_squares
 
     parent_T_camera = se3.inverse(camera_T_parent)
-    scale = limit * _ROBUST
-    for _ in range(3):
+    scale = limit * POSE.robust
+    for _ in range(POSE.refinements):
         agree = _apart(seen, se3.inverse(parent_T_camera)) < limit
         kept, start = seen.select(agree), parent_T_camera
 
@@ -145,10 +138,10 @@ def _apart(seen: Sightings, camera_T_parent: Array) -> Array:
     """Reprojection errors (N,) in units of focal length; infinite behind the camera."""
     depth = seen.points @ camera_T_parent[2, :3] + camera_T_parent[2, 3]
     off = np.linalg.norm(_projected(seen.points, camera_T_parent) - seen.rays, axis=1)
-    return np.where(depth > _NEAR_M, off, np.inf)
+    return np.where(depth > POSE.near_m, off, np.inf)
 
 
 def _projected(points: Array, camera_T_parent: Array) -> Array:
     """(N, 2): x / z and y / z."""
     p = se3.transform_points(camera_T_parent, points)
-    return np.asarray(p[:, :2] / np.maximum(p[:, 2:], _NEAR_M))
+    return np.asarray(p[:, :2] / np.maximum(p[:, 2:], POSE.near_m))

@@ -14,29 +14,10 @@ from hecbench.errors import InputError
 from hecbench.se3 import Array
 from hecbench_plugins.perception.card import ModelCard, read_card
 from hecbench_plugins.perception.plan import STRIDE
+from hecbench_plugins.perception.settings import READING
 from hecbench_plugins.perception.skeleton import keypoint_positions
 
 Floats = NDArray[np.float32]
-
-_COARSE_PX, _FINE_PX = (320, 448), (224, 288)
-"""The longer sides of the picture in the first and second pass; the answers of a pass are averaged."""
-_FILL = 0.78
-"""Share of the second pass's picture that the robot takes."""
-_SMOOTHING = 0.35
-"""Standard deviation of the blur before shrinking, in pixels of the small picture: it keeps aliases out."""
-_BLUR_BELOW = 0.6
-_ROBOT = 0.5
-_PIECE = 0.3
-"""Of the largest piece's area: smaller pieces are not the robot."""
-_LEAST_CONFIDENCE = 0.26
-"""Chosen between 60 photographs with a robot (least 0.29) and 63 without one (largest 0.25, 95 % at 0.16)."""
-_BEST_KEYPOINTS = 3
-_GUIDE_CELLS, _GUIDE_SOFTENING = 1.5, 1e-2
-"""Radius and variance (of RGB in [0, 1]) of the filter that moves a mask's edge to the image's."""
-_BEYOND = -15.0
-"""The logit of everything that the second pass does not show."""
-_HEAT_CELLS = 3
-"""A keypoint is the centre of its heatmap within so many cells of the highest."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,7 +43,7 @@ class Sighting:
 
     def visible(self) -> Floats:
         """(H, W) in [0, 1]: the robot where nothing hides it. All 0 when there is none."""
-        logits = self._spread(self.logits[len(self.card.palette)], _BEYOND)
+        logits = self._spread(self.logits[len(self.card.palette)], READING.beyond)
         return self._sharpened(np.asarray(1 / (1 + np.exp(-logits)), np.float32))
 
     def whole(self) -> Floats:
@@ -79,19 +60,19 @@ class Sighting:
 
         The guided filter (He, Sun and Tang 2013) fits the mask as a linear function of the colours nearby.
         """
-        radius = max(2, round(_GUIDE_CELLS * float(self.pixel_T_cell[0, 0])))
+        radius = max(2, round(READING.guide_cells * float(self.pixel_T_cell[0, 0])))
         guide = self.image.astype(np.float32) / 255
-        sharp = cv2.ximgproc.guidedFilter(guide, share, radius, _GUIDE_SOFTENING)
+        sharp = cv2.ximgproc.guidedFilter(guide, share, radius, READING.guide_softening)
         sharp = np.clip(np.asarray(sharp, np.float32), 0, 1)
-        found = self.confidence > _LEAST_CONFIDENCE
-        return np.asarray(found * sharp * _largest(sharp > _ROBOT), np.float32)
+        found = self.confidence > READING.least_confidence
+        return np.asarray(found * sharp * _largest(sharp > READING.robot), np.float32)
 
     def _shares(self) -> Floats:
         """(H, W, 1 + C) of the background and the colours."""
         count = len(self.card.palette)
         top = self.logits[:count].max(0)
         spread = [
-            self._spread(channel - top, 0.0 if place == 0 else _BEYOND)
+            self._spread(channel - top, 0.0 if place == 0 else READING.beyond)
             for place, channel in enumerate(self.logits[:count])
         ]
         return _softmax(np.stack(spread, -1), -1)
@@ -143,10 +124,10 @@ class PerceptionModel:
                 f"a picture of {STRIDE} x {STRIDE} px RGB or larger is needed, not {image.shape}"
             )
         height, width = image.shape[:2]
-        logits, pixel_T_cell = self._look(image, np.array([0.0, 0.0, width, height]), _COARSE_PX)
+        logits, pixel_T_cell = self._look(image, np.array([0.0, 0.0, width, height]), READING.coarse_px)
         box = self._around(logits, pixel_T_cell, width, height)
         if box is not None:
-            logits, pixel_T_cell = self._look(image, box, _FINE_PX)
+            logits, pixel_T_cell = self._look(image, box, READING.fine_px)
         keypoints, trust = _tops(logits[len(self.card.palette) + 1 :])
         confidence = _confidence(logits[len(self.card.palette)], trust)
         keypoints = keypoints @ pixel_T_cell[:, :2].T + pixel_T_cell[:, 2]
@@ -178,8 +159,8 @@ class PerceptionModel:
         size = np.maximum(np.ceil(side * scale / STRIDE - 1e-6), 1).astype(int) * STRIDE
         corner = (box[:2] + box[2:]) / 2 - size / scale / 2
         pixel_T_small = np.c_[np.eye(2) / scale, 0.5 / scale + corner - 0.5]
-        if scale < _BLUR_BELOW:
-            image = np.asarray(cv2.GaussianBlur(image, (0, 0), _SMOOTHING / scale), np.uint8)
+        if scale < READING.blur_below:
+            image = np.asarray(cv2.GaussianBlur(image, (0, 0), READING.smoothing / scale), np.uint8)
         small = cv2.warpAffine(
             image,
             pixel_T_small,
@@ -200,12 +181,12 @@ class PerceptionModel:
     def _around(self, logits: Floats, pixel_T_cell: Array, width: int, height: int) -> Array | None:
         """The box around the robot, widened; None when there is none."""
         share = 1 - _softmax(logits[: len(self.card.palette)], 0)[0]
-        y, x = np.nonzero(_largest(share > _ROBOT) * (share > _ROBOT))
+        y, x = np.nonzero(_largest(share > READING.robot) * (share > READING.robot))
         if len(x) == 0:
             return None
         ends = np.array([[x.min(), y.min()], [x.max(), y.max()]]) @ pixel_T_cell[:, :2].T + pixel_T_cell[:, 2]
         low, high = np.clip(ends, 0, [width, height])
-        half = np.maximum(max((high - low).max() / _FILL, STRIDE), high - low) / 2
+        half = np.maximum(max((high - low).max() / READING.fill, STRIDE), high - low) / 2
         return np.concatenate([(low + high) / 2 - half, (low + high) / 2 + half])
 
 
@@ -227,7 +208,7 @@ def _largest(mask: NDArray[np.bool_]) -> NDArray[np.float32]:
     """1 on the largest piece of a mask and on pieces near its size, and where there is no piece; 0 on small pieces."""
     _, label, about, _ = cv2.connectedComponentsWithStats(mask.astype(np.uint8))
     area = about[:, cv2.CC_STAT_AREA].astype(float)
-    keep = area >= _PIECE * area[1:].max(initial=0.0)
+    keep = area >= READING.piece * area[1:].max(initial=0.0)
     keep[0] = True
     return np.asarray(keep[label], np.float32)
 
@@ -240,7 +221,7 @@ def _confidence(visible: Floats, trust: Array) -> float:
     robot = visible[visible > 0]
     if robot.size == 0:
         return 0.0
-    return float(1 / (1 + np.exp(-np.median(robot))) * np.sort(trust)[-_BEST_KEYPOINTS:].mean())
+    return float(1 / (1 + np.exp(-np.median(robot))) * np.sort(trust)[-READING.best_keypoints :].mean())
 
 
 def _tops(heat: Floats) -> tuple[Array, Array]:
@@ -248,8 +229,8 @@ def _tops(heat: Floats) -> tuple[Array, Array]:
     places, trust = np.empty((len(heat), 2)), np.empty(len(heat))
     for k, share in enumerate(_softmax(heat.reshape(len(heat), -1), 1).reshape(heat.shape)):
         y, x = np.unravel_index(share.argmax(), share.shape)
-        top, left = max(0, int(y) - _HEAT_CELLS), max(0, int(x) - _HEAT_CELLS)
-        near = share[top : y + _HEAT_CELLS + 1, left : x + _HEAT_CELLS + 1]
+        top, left = max(0, int(y) - READING.heat_cells), max(0, int(x) - READING.heat_cells)
+        near = share[top : y + READING.heat_cells + 1, left : x + READING.heat_cells + 1]
         trust[k] = near.sum()
         down, across = near.sum(1), near.sum(0)
         places[k] = (across @ (left + np.arange(len(across))), down @ (top + np.arange(len(down)))) / trust[k]

@@ -14,7 +14,6 @@ from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Need, SolverSpec
 from hecbench_plugins.markers.hand_eye import (
-    MINIMUM_ROTATION_DEG,
     PosedSamples,
     pose_pairs,
     rotation_diversity_deg,
@@ -22,6 +21,7 @@ from hecbench_plugins.markers.hand_eye import (
     to_estimate,
 )
 from hecbench_plugins.markers.opencv_hand_eye import hand_eye
+from hecbench_plugins.markers.settings import HAND_EYE
 
 _USABLE_SINE = 0.3, 1.7
 """OpenCV leaves out pairs whose 2 sin(angle / 2) lies outside; without pairs it returns the identity."""
@@ -55,7 +55,7 @@ def _require_usable_pairs(pairs: PosedSamples) -> int:
     sines = 2 * np.sin(np.linalg.norm([logs_A, logs_B], axis=-1) / 2)
     usable = ((sines > _USABLE_SINE[0]) & (sines < _USABLE_SINE[1])).all(0)
     second = np.append(rotation_diversity_deg(logs_A[usable]), 0.0)[1] if usable.any() else 0.0
-    if second < MINIMUM_ROTATION_DEG:
+    if second < HAND_EYE.least_rotation_deg:
         raise Refusal(
             f"only {usable.sum()} of {len(usable)} pairs turn by 17 to 116 deg, the range this method uses, "
             f"and by {second:.2g} deg rms about their second axis: add samples tilted by 20 to 60 deg"

@@ -21,12 +21,12 @@ from hecbench.se3 import Array
 from hecbench.specs import Need, SolverSpec
 from hecbench_plugins.markers import dual_quaternions
 from hecbench_plugins.markers.hand_eye import (
-    MINIMUM_ROTATION_DEG,
     PosedSamples,
     pose_pairs,
     rotation_diversity_deg,
     to_estimate,
 )
+from hecbench_plugins.markers.settings import HAND_EYE
 
 _ITERATIONS = 50
 """Of the descent, at most."""
@@ -87,7 +87,7 @@ def _without_half_turns(pairs: PosedSamples) -> tuple[Array, Array]:
     kept = angles_deg.max(0) < 180.0 - margin_deg
     if (
         not kept.any()
-        or rotation_diversity_deg(pairs.rotation_logs[0][kept])[1:2].sum() < MINIMUM_ROTATION_DEG
+        or rotation_diversity_deg(pairs.rotation_logs[0][kept])[1:2].sum() < HAND_EYE.least_rotation_deg
     ):
         raise Refusal(
             f"{(~kept).sum()} of {len(kept)} motions are half a turn, where quaternions lose their sign, and "

@@ -15,15 +15,10 @@ from hecbench.recording import Recording
 from hecbench.rendering.undistort import shrunk_intrinsics
 from hecbench.robots.posed import PosedRobot
 from hecbench.se3 import Array
+from hecbench_plugins.views.settings import CANVAS
 from hecbench_plugins.views.spool import Spool
 
 Images = NDArray[np.uint8]
-
-PAD_PX = 60
-"""By which the canvas is larger than the image on each side: a lens bends the robot's base out of the image."""
-_LARGEST_PX = 1600
-"""Wider canvases are shrunk: a contour is found to a fraction of a pixel anyway."""
-_GRID = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,8 +87,9 @@ class Rectification:
         """
         import cv2
 
-        pad = 0 if camera.is_pinhole else PAD_PX
-        width, height = (-(-(size + 2 * pad) // _GRID) * _GRID for size in (camera.width, camera.height))
+        pad = 0 if camera.is_pinhole else CANVAS.pad_px
+        grid = CANVAS.grid_px
+        width, height = (-(-(size + 2 * pad) // grid) * grid for size in (camera.width, camera.height))
         K = camera.intrinsics.copy()
         K[:2, 2] += pad
         if K[0, 1] != 0:
@@ -103,7 +99,7 @@ class Rectification:
         coefficients = camera.distortion if len(camera.distortion) else np.zeros(4)
         across, down = rectify(camera.intrinsics, coefficients, np.eye(3), K, (width, height), cv2.CV_32FC1)
         valid = (across >= 0) & (down >= 0) & (across <= camera.width - 1) & (down <= camera.height - 1)
-        shrink = int(np.ceil(width / _LARGEST_PX))
+        shrink = int(np.ceil(width / CANVAS.largest_px))
         if shrink > 1:
             height, width = _shrunk_size(valid.shape, shrink)
             cut = valid[: height * shrink, : width * shrink]
@@ -125,7 +121,9 @@ class Rectification:
 
 def _shrunk_size(shape: Sequence[int], by: int) -> tuple[int, int]:
     """(H, W), whole multiples of the grid."""
-    return shape[0] // by // _GRID * _GRID, shape[1] // by // _GRID * _GRID
+    return shape[0] // by // CANVAS.grid_px * CANVAS.grid_px, shape[
+        1
+    ] // by // CANVAS.grid_px * CANVAS.grid_px
 
 
 def undistorted_canvas(recording: Recording, robot: PosedRobot) -> Canvas:

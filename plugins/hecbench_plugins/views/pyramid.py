@@ -15,17 +15,11 @@ from hecbench.rendering.undistort import Undistortion, shrunk_intrinsics
 from hecbench.robots.model import RobotModel
 from hecbench.robots.posed import PosedRobot
 from hecbench.se3 import Array
+from hecbench_plugins.views.settings import PYRAMID
 
 Picture = NDArray[np.float32]
 
-LEVELS = (4, 2, 1)
-"""Pixels of the recording per pixel of a level, coarse to fine."""
 _COARSE_CELL_M = {16: 0.02, 8: 0.01, 4: 0.004, 2: 0.0015, 1: 0.0}
-_LEAST_PX = 32
-"""Of a picture's side: eight pixels at the coarsest of the levels."""
-_LEAST_MASK, _MOST_MASK = 1e-3, 0.95
-_BACKGROUND_SPREAD = 0.08
-_SMALLEST_HIDING_PX, _SOFT_EDGE_PX = 9, 2
 
 
 class NoMask(Refusal):
@@ -102,9 +96,10 @@ def photographed_robot(recording: Recording) -> PosedRobot:
     if recording.joints_rad is None:
         raise Refusal("no sample has joints_rad")
     width, height = recording.camera.width, recording.camera.height
-    if min(width, height) < _LEAST_PX:
+    if min(width, height) < PYRAMID.least_px:
         raise Refusal(
-            f"pictures of {width}x{height} px are too small to find the robot in: {_LEAST_PX} px or more each way"
+            f"pictures of {width}x{height} px are too small to find the robot in: {PYRAMID.least_px} px or more each "
+            "way"
         )
     return PosedRobot.of(recording)
 
@@ -155,7 +150,7 @@ def _view(
         assert raw is not None
         mask = foreground(raw, where)
     filled = float((mask > 0.5).mean())
-    if not _LEAST_MASK < filled < _MOST_MASK:
+    if not PYRAMID.least_mask < filled < PYRAMID.most_mask:
         raise Refusal(
             f"{where}: the mask covers {100 * filled:.1f} % of the image: no contour of a robot to align"
         )
@@ -163,7 +158,7 @@ def _view(
         outside = raw[_far_from(mask)]
         if len(outside):
             background = np.median(outside, 0)
-            uniform = bool(np.abs(outside - background).mean() < _BACKGROUND_SPREAD)
+            uniform = bool(np.abs(outside - background).mean() < PYRAMID.background_spread)
     cut = np.zeros((*mask.shape, 4), np.float32)
     cut[..., 3] = mask
     if raw is not None:
@@ -186,7 +181,7 @@ def _view(
             reference,
             None if hidden is None else shrink(hidden[..., None].astype(np.float32), level)[..., 0] > 0,
         )
-        for level in LEVELS
+        for level in PYRAMID.levels
     }
     full = raw if raw is not None else np.zeros((*mask.shape, 3), np.float32)
     return View(joints_rad, parent_T_link, levels, full, has_image, has_mask, uniform)
@@ -230,7 +225,7 @@ def foreground(image: Picture, where: str) -> Picture:
     smooth = cv2.blur(image, (5, 5), borderType=cv2.BORDER_REFLECT)
     off = np.abs(smooth - background).max(-1)
     rim = np.concatenate([off[:8].ravel(), off[-8:].ravel()])
-    if np.percentile(rim, 90) > _BACKGROUND_SPREAD:
+    if np.percentile(rim, 90) > PYRAMID.background_spread:
         raise NoMask(f"{where}: no mask, and the background is not uniform: give masks of the robot")
     from scipy import ndimage
 
@@ -244,18 +239,20 @@ def hidden_by_others(
 ) -> NDArray[np.bool_] | None:
     """Where (H, W) something neither robot, by the mask, nor background, by the picture, may hide the robot.
 
-    Such places say nothing about the robot. What is thinner than `_SMALLEST_HIDING_PX` is a ragged edge of the mask.
+    Such places say nothing about the robot. What is thinner than `smallest_hiding_px` is a ragged edge of the mask.
     Where more is other than is robot, the picture shows a furnished scene, and the mask alone says what hides.
     """
     import cv2
 
-    red, green, blue = (np.abs(cv2.blur(image, (5, 5)) - background) > _BACKGROUND_SPREAD).transpose(2, 0, 1)
+    red, green, blue = (np.abs(cv2.blur(image, (5, 5)) - background) > PYRAMID.background_spread).transpose(
+        2, 0, 1
+    )
     off = red | green | blue
     other = (off & (mask < 0.5)).astype(np.uint8)
-    thick = cv2.morphologyEx(other, cv2.MORPH_OPEN, np.ones((_SMALLEST_HIDING_PX,) * 2, np.uint8))
+    thick = cv2.morphologyEx(other, cv2.MORPH_OPEN, np.ones((PYRAMID.smallest_hiding_px,) * 2, np.uint8))
     if not thick.any() or thick.mean() > (mask > 0.5).mean():
         return None
-    return np.asarray(cv2.dilate(thick, np.ones((2 * _SOFT_EDGE_PX + 1,) * 2, np.uint8)) > 0)
+    return np.asarray(cv2.dilate(thick, np.ones((2 * PYRAMID.soft_edge_px + 1,) * 2, np.uint8)) > 0)
 
 
 def _far_from(mask: Picture) -> NDArray[np.bool_]:

@@ -16,11 +16,9 @@ from hecbench.rendering import Renderer
 from hecbench.rendering.undistort import shrunk_intrinsics
 from hecbench.se3 import Array
 from hecbench_plugins.views.pyramid import meshes_by_level, photographed_robot
+from hecbench_plugins.views.settings import CANVAS
 
 Mask = NDArray[np.bool_]
-
-_WIDEST = 3.0
-"""Largest side of the drawn canvas over that of the image."""
 
 
 class Silhouettes:
@@ -69,7 +67,7 @@ def _canvas(camera: CameraModel) -> tuple[tuple[NDArray[np.intp], NDArray[np.int
     """For each pixel (H, W) of the image its row and column on a pinhole canvas; K, width, height of that canvas.
 
     None instead of rows and columns when the image is the canvas. A barrel lens sees more than the pinhole of the same
-    size: the canvas is as wide as needed, up to `_WIDEST`.
+    size: the canvas is as wide as needed, up to `widest`.
     """
     width, height = camera.width, camera.height
     if camera.is_pinhole:
@@ -79,7 +77,7 @@ def _canvas(camera: CameraModel) -> tuple[tuple[NDArray[np.intp], NDArray[np.int
     ideal = undistort(rays[..., :2], camera) @ camera.intrinsics[:2, :2].T + camera.intrinsics[:2, 2]
     ideal = np.nan_to_num(ideal, nan=np.inf)
     size = np.array([width, height])
-    margin = (_WIDEST - 1) / 2 * size
+    margin = (CANVAS.widest - 1) / 2 * size
     low = np.floor(np.maximum(ideal.min((0, 1)), -margin)).astype(int)
     high = np.ceil(np.minimum(ideal.max((0, 1)), size - 1 + margin)).astype(int)
     place = np.clip(np.rint(ideal), low, high).astype(int) - low

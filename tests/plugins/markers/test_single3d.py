@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from hecbench_plugins.markers import single3d
+from hecbench_plugins.markers.settings import SINGLE3D
 from hecbench_plugins.solvers.single3d_closed import Single3DClosed
 from hecbench_plugins.solvers.single3d_iterative import single3d_iterative
 from scipy.optimize import least_squares
@@ -94,7 +95,7 @@ def test_coplanar_positions_ruin_the_closed_form_only():
 
 def test_spread_positions_are_well_conditioned(rng):
     found = single3d_iterative(rig(rng, Mounting.EYE_TO_HAND), rng=rng)
-    assert found.diagnostics["coplanarity_condition"] < single3d.COPLANAR_CONDITION
+    assert found.diagnostics["coplanarity_condition"] < SINGLE3D.coplanar_condition
     assert not found.diagnostics["nearly_coplanar"]
 
 
