@@ -39,5 +39,5 @@ def on_a_sphere(views: DepthViews) -> Iterator[Array]:
     sphere, coarsest = ViewSphere(spacing_deg=settings.sphere_deg), views.meshes[max(views.meshes)]
     seen = views.K, views.valid, views.parent_T_link, moved
     yield from by_photographs.starts(
-        coarsest, *seen, sphere, settings.sphere_starts, [float(np.median(near))]
+        (coarsest, coarsest), *seen, sphere, settings.sphere_starts, [float(np.median(near))]
     )

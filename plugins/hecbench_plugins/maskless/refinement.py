@@ -67,16 +67,38 @@ def refine_further(
 ) -> Refined:
     """The same from a comparison that was made within `radius_m` already, by the colours found there."""
     pose, found, converged, iteration = start.camera_T_parent, start.last, False, 0
+    relaxation, before = 1.0, None
     for iteration in range(1, step.rounds + 1):  # noqa: B007 the number of the last is reported
         if found.points < CONTOUR.fewest_points:
             break
         move = np.linalg.solve(found.A + np.diag(CONTOUR.damping * np.diag(found.A) + 1e-9), found.b)
-        pose = se3.exp(limited(move)) @ pose
+        relaxation, before = relaxed(relaxation, before, move, found.A), move
+        pose = se3.exp(limited(relaxation * move)) @ pose
         found = lines(pose, step.spacing, radius_m=radius_m)
         converged = settled(found, move, sigmas)
         if converged:
             break
     return Refined(pose, found, start.iterations + iteration, converged)
+
+
+def relaxed(relaxation: float, before: NDArray[Any] | None, move: NDArray[Any], information: Array) -> float:
+    """By how much to lengthen a move (M,) that goes on in the direction of the one before.
+
+    Posteriors pull the contour only part of the way, so that moves shrink like a geometric series; its sum is known
+    from two of them (Irons and Tuck 1969, "A version of the Aitken accelerator for computer iteration", eq. 8).
+
+    Args:
+        relaxation: of the move before.
+        before: None at first.
+        move: not lengthened.
+        information: (M, M), which measures both.
+    """
+    if before is None:
+        return 1.0
+    along, squares = float(before @ information @ move), float(before @ information @ before)
+    if along < CONTOUR.same_direction * np.sqrt(squares * float(move @ information @ move)):
+        return 1.0
+    return min(max(relaxation / max(1 - along / squares, 1e-3), 1.0), CONTOUR.most_relaxation)
 
 
 def settled(found: ContourEquations, move: NDArray[Any], sigmas: float = CONTOUR.settled) -> bool:

@@ -21,7 +21,7 @@ from hecbench.se3 import Array
 from hecbench.system import threads
 from hecbench_plugins.maskless import search_kernels
 from hecbench_plugins.maskless.ball import Ball
-from hecbench_plugins.maskless.settings import SEARCH
+from hecbench_plugins.maskless.settings import SEARCH, SearchSettings
 from hecbench_plugins.views.canvas import Canvas
 
 
@@ -132,10 +132,15 @@ def _clustered(
 
 
 def search(
-    score: Score, start: Array, ball: Ball, restarts: int, rng: np.random.Generator
+    score: Score,
+    start: Array,
+    ball: Ball,
+    restarts: int,
+    rng: np.random.Generator,
+    settings: SearchSettings = SEARCH,
 ) -> Iterator[tuple[Array, float]]:
     """The best parent_T_camera of each descent and its cost, descents from the best draws first."""
-    draws = SEARCH.draws if score.has_motion else SEARCH.draws_without_motion
+    draws = settings.draws if score.has_motion else settings.draws_without_motion
     coordinates = np.concatenate([np.zeros((1, 6)), ball.draw(rng, draws)])
 
     def poses(x: Array) -> Array:
@@ -143,32 +148,36 @@ def search(
 
     def cost(x: Array) -> Array:
         off = np.linalg.norm((x / ball.scale).reshape(-1, 2, 3), axis=2)
-        beyond = np.maximum(off - SEARCH.limit, 0).sum(1)
+        beyond = np.maximum(off - settings.limit, 0).sum(1)
         return np.asarray(
-            score(poses(x)) + SEARCH.prior_weight * (off**2).sum(1) + SEARCH.beyond_weight * beyond
+            score(poses(x)) + settings.prior_weight * (off**2).sum(1) + settings.beyond_weight * beyond
         )
 
-    score.limit_region(poses(coordinates[: SEARCH.region_poses]))
+    score.limit_region(poses(coordinates[: settings.region_poses]))
     order = cost(coordinates).argsort()
     seeds: list[Array] = []
     for x in coordinates[order]:
         if len(seeds) == restarts:
             break
-        if all(np.linalg.norm((x - seed) / ball.scale) > SEARCH.apart for seed in seeds):
+        if all(np.linalg.norm((x - seed) / ball.scale) > settings.apart for seed in seeds):
             seeds.append(x)
     for seed in seeds:
-        x, lowest = minimise(cost, seed, SEARCH.first_sigma * ball.scale, rng)
+        x, lowest = minimise(cost, seed, settings.first_sigma * ball.scale, rng, settings)
         yield ball.pose(start, x), lowest
 
 
 def minimise(
-    cost: Callable[[Array], Array], start: Array, sigma: Array, rng: np.random.Generator
+    cost: Callable[[Array], Array],
+    start: Array,
+    sigma: Array,
+    rng: np.random.Generator,
+    settings: SearchSettings = SEARCH,
 ) -> tuple[Array, float]:
     """The lowest point (d,) that CMA-ES meets, and its cost; `cost` takes (n, d), `sigma` (d,) scales the axes.
 
     Parameters as Hansen 2016, table 1, without negative weights.
     """
-    d, n, parents = len(start), SEARCH.population, SEARCH.population // 2
+    d, n, parents = len(start), settings.population, settings.population // 2
     weights = np.log(parents + 0.5) - np.log(np.arange(1, parents + 1))
     weights /= weights.sum()
     effective = 1 / (weights**2).sum()
@@ -181,7 +190,7 @@ def minimise(
     mean, covariance, step = start.astype(float), np.eye(d), 1.0
     path, step_path = np.zeros(d), np.zeros(d)
     best, lowest = mean, np.inf
-    for generation in range(SEARCH.generations):
+    for generation in range(settings.generations):
         values, axes = np.linalg.eigh(covariance)
         lengths = np.sqrt(np.maximum(values, 1e-20))
         moves = rng.normal(size=(n, d)) * lengths @ axes.T
@@ -206,6 +215,6 @@ def minimise(
             + rank_many * (chosen.T * weights) @ chosen
         )
         step *= float(np.exp(keep_step / damping * (length / expected - 1)))
-        if step * lengths.max() < SEARCH.settled:
+        if step * lengths.max() < settings.settled:
             break
     return best, lowest

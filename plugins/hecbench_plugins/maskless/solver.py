@@ -21,9 +21,10 @@ from hecbench_plugins.maskless.contour import Background, ContourEquations, Cont
 from hecbench_plugins.maskless.offsets import compare, prior_information, with_joint_offsets
 from hecbench_plugins.maskless.refinement import Refined, RefinementLevel, refine, refine_further, schedule
 from hecbench_plugins.maskless.search import Score, search
-from hecbench_plugins.maskless.settings import CONTOUR, COURSE, SEARCH
+from hecbench_plugins.maskless.settings import CONTOUR, COURSE, LATTICE_SEARCH, SEARCH, SearchSettings
 from hecbench_plugins.second_order.unknowns import Unknown
 from hecbench_plugins.start_search.by_photographs import starts
+from hecbench_plugins.start_search.settings import PHOTOGRAPHS
 from hecbench_plugins.start_search.view_sphere import ViewSphere
 from hecbench_plugins.views import scene_background
 from hecbench_plugins.views.canvas import Canvas, undistorted_canvas
@@ -33,11 +34,12 @@ from hecbench_plugins.views.pyramid import mesh_at, meshes_by_level, photographe
 
 @dataclass(frozen=True, eq=False)
 class SearchRegion:
-    """Where to search: about which parent_T_camera (4, 4), how far, and with how many descents."""
+    """Where to search: about which parent_T_camera (4, 4), how far, with how many descents and how thoroughly."""
 
     start: Array
     ball: Ball
     restarts: int
+    settings: SearchSettings = SEARCH
 
     def __str__(self) -> str:
         return f"{self.ball} from {np.array2string(self.start[:3, 3], precision=2, separator=', ')} m"
@@ -101,15 +103,26 @@ class Photographs:
         """All steps but the last from a pose of the search, on the searched views."""
         pose, found = camera_T_parent, None
         for step in schedule(self.canvas.valid.shape[1])[0]:
-            lines = self._searched.get(step) or self._searched.setdefault(
-                step, self.lines(step, self.search_views)
-            )
-            before = lines.renders
-            found = refine(lines, pose, step)
+            found = self.refined_by(step, pose)
             pose = found.camera_T_parent
-            self.renders += lines.renders - before
         assert found is not None
         return found
+
+    def refined_by(
+        self, step: RefinementLevel, camera_T_parent: Array, sigmas: float = CONTOUR.settled
+    ) -> Refined:
+        """One step from a pose, on the searched views."""
+        lines = self._searched.get(step) or self._searched.setdefault(
+            step, self.lines(step, self.search_views)
+        )
+        before = lines.renders
+        found = refine(lines, camera_T_parent, step, sigmas)
+        self.renders += lines.renders - before
+        return found
+
+    def forget_sizes(self) -> None:
+        """Free what was kept for further descents."""
+        self._searched.clear()
 
 
 @dataclass(frozen=True)
@@ -161,7 +174,7 @@ class Maskless:
         best: Candidate | None = None
         for place in self._places(photographs, start, foreground):
             score = Score(photographs.meshes[SEARCH.level], search_views, foreground, rng)
-            for coarse, _ in search(score, place.start, place.ball, place.restarts, rng):
+            for coarse, _ in search(score, place.start, place.ball, place.restarts, rng, place.settings):
                 photographs.descents += 1
                 end = photographs.refined(se3.inverse(coarse))
                 away = place.ball.away(place.start, se3.inverse(end.camera_T_parent))
@@ -182,12 +195,19 @@ class Maskless:
     ) -> list[SearchRegion]:
         """Where to search, in this order."""
         if self.free is not None and foreground is not None:
-            mesh = photographs.meshes[SEARCH.level]
+            model, mesh = photographs.robot.model, photographs.meshes[SEARCH.level]
+            coarse = RenderMesh.cached(model, cell_m=PHOTOGRAPHS.coarse_cell_m)
             seen = photographs.search_views
             found = starts(
-                mesh, seen.K, seen.valid, seen.parent_T_link, foreground, self.free, COURSE.free_starts
+                (coarse, mesh),
+                seen.K,
+                seen.valid,
+                seen.parent_T_link,
+                foreground,
+                self.free,
+                COURSE.free_starts,
             )
-            return [SearchRegion(se3.inverse(pose), COURSE.free_ball, 1) for pose in found]
+            return [SearchRegion(se3.inverse(pose), COURSE.free_ball, 1, LATTICE_SEARCH) for pose in found]
         assert start is not None
         balls = (
             (COURSE.far,) if len(photographs.canvas) >= COURSE.fewest_for_far else (COURSE.near, COURSE.far)
@@ -199,8 +219,12 @@ class Maskless:
         canvas = photographs.canvas
         _, last = schedule(canvas.valid.shape[1])
         path = [*found.path, ("refined", found.camera_T_parent)]
+        rough = found.camera_T_parent
+        if len(canvas) > len(photographs.search_views):
+            rough = photographs.refined_by(last, rough, COURSE.roughly).camera_T_parent
+        photographs.forget_sizes()
         lines = photographs.lines(last, canvas)
-        end = refine(lines, found.camera_T_parent, last, COURSE.roughly)
+        end = refine(lines, rough, last, COURSE.roughly)
         rest, left_out_m = _without_tool(lines, end, last.spacing), 0.0
         if rest is not None:
             end, left_out_m = replace(end, last=rest), COURSE.tool_m

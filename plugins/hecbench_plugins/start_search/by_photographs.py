@@ -23,7 +23,7 @@ from hecbench_plugins.start_search.view_sphere import ViewSphere, best_apart, lo
 
 
 def starts(
-    mesh: RenderMesh,
+    meshes: tuple[RenderMesh, RenderMesh],
     K: Array,
     valid: NDArray[np.bool_],
     parent_T_link: Array,
@@ -35,7 +35,7 @@ def starts(
     """The best camera_T_parent (4, 4), best first, distinct, for the search to begin at.
 
     Args:
-        mesh: of the robot, coarse.
+        meshes: of the robot, for the coarse and the finer drawings.
         K: (3, 3) px of the fixed camera.
         valid: (H, W) where its pictures say something.
         parent_T_link: (N, L, 4, 4) m; the z of the parent frame points up.
@@ -52,9 +52,9 @@ def starts(
     poses = np.concatenate([look_at(rotations, middle, centre, distance) for distance in distances_m])
     views = np.unique(np.linspace(0, len(parent_T_link) - 1, PHOTOGRAPHS.views).round().astype(int))
     seen = K, valid, parent_T_link[views], foreground[views]
-    _, costs = _shifted(mesh, seen, poses, PHOTOGRAPHS.coarse_px)
+    _, costs = _shifted(meshes[0], seen, poses, PHOTOGRAPHS.coarse_px)
     better = np.sort(costs.argsort(kind="stable")[: max(count, round(PHOTOGRAPHS.better * len(poses)))])
-    found, costs = _shifted(mesh, seen, poses[better], PHOTOGRAPHS.width_px)
+    found, costs = _shifted(meshes[1], seen, poses[better], PHOTOGRAPHS.width_px)
     return [found[i] for i in best_apart(list(found), list(-costs), count, PHOTOGRAPHS.apart)]
 
 
@@ -67,9 +67,8 @@ def _shifted(
     """The poses (n, 4, 4), each turned to where the photographs changed, and the costs (n,) of that."""
     shifts = [_Shifts(mesh, *seen, width) for _ in range(threads.count())]
     pairs = zip(shifts, np.array_split(poses, len(shifts)), strict=True)
-    shares = threads.each(lambda pair: [pair[0](pose) for pose in pair[1]], pairs)
-    rays, costs = zip(*(row for share in shares for row in share), strict=True)
-    return _turn_to(np.array(rays)) @ poses, np.array(costs)
+    rays, costs = zip(*threads.each(lambda pair: pair[0](pair[1]), pairs), strict=True)
+    return _turn_to(np.concatenate(rays)) @ poses, np.concatenate(costs)
 
 
 def _moving(parent_T_link: Array) -> tuple[Array, float]:
@@ -79,7 +78,7 @@ def _moving(parent_T_link: Array) -> tuple[Array, float]:
 
 
 class _Shifts:
-    """For a pose that looks at the robot, the turn of the camera that puts it where the photographs changed."""
+    """For poses that look at the robot, the turns of the camera that put it where the photographs changed."""
 
     def __init__(
         self,
@@ -91,6 +90,7 @@ class _Shifts:
         width: int,
     ) -> None:
         import cv2
+        from scipy import fft
 
         self._parent_T_link = parent_T_link
         height = round(width * valid.shape[0] / valid.shape[1])
@@ -106,22 +106,30 @@ class _Shifts:
             gain[view, :height, :width] = PHOTOGRAPHS.unchanged_cost * (1 - small) - small
         inside = cv2.resize(valid.astype(np.float32), (width, height), interpolation=cv2.INTER_AREA)
         gain[:, :height, :width] *= inside > 0.9
-        self._gain = np.fft.rfft2(gain)
-        self._covered = np.zeros_like(gain)
+        self._gain = fft.rfft2(gain)
+        self._covered = np.zeros((PHOTOGRAPHS.batch, *gain.shape), np.float32)
         self._ray_of = np.linalg.inv(self._K)
 
-    def __call__(self, camera_T_parent: Array) -> tuple[Array, float]:
-        """The ray (x, y, 1) to turn the optical axis to, and its cost; the cost of a robot that is nowhere is 0."""
-        renderer = self._renderer
-        coverage(renderer.scene, renderer.sight, camera_T_parent, self._parent_T_link, self._covered)
-        spectrum = (np.fft.rfft2(self._covered).conj() * self._gain).sum(0)
-        costs = np.fft.irfft2(spectrum, self._size)
-        best = np.unravel_index(costs.argmin(), self._size)
-        row, column = (
-            place - size if place > size / 2 else place for place, size in zip(best, self._size, strict=True)
-        )
-        at = self._middle + np.array([column, row])
-        return self._ray_of @ np.array([*at, 1.0]), float(costs[best])
+    def __call__(self, camera_T_parents: Array) -> tuple[Array, Array]:
+        """Rays (n, 3), x, y, 1, to turn the optical axes of poses (n, 4, 4) to, and costs (n,); of no robot: 0."""
+        batches = range(0, len(camera_T_parents), len(self._covered))
+        found = [self._best(camera_T_parents[first : first + len(self._covered)]) for first in batches]
+        rays, costs = (np.concatenate(column) for column in zip(*found, strict=True))
+        return rays, costs
+
+    def _best(self, camera_T_parents: Array) -> tuple[Array, Array]:
+        from scipy import fft
+
+        renderer, covered = self._renderer, self._covered[: len(camera_T_parents)]
+        coverage(renderer.scene, renderer.sight, camera_T_parents, self._parent_T_link, covered)
+        spectra = (fft.rfft2(covered).conj() * self._gain).sum(1)
+        costs = fft.irfft2(spectra, self._size).reshape(len(covered), -1)
+        best = costs.argmin(1)
+        places = np.stack(np.unravel_index(best, self._size), 1)
+        size = np.array(self._size)
+        shifts = np.where(places > size / 2, places - size, places)[:, ::-1]
+        at = np.column_stack([self._middle + shifts, np.ones(len(covered))])
+        return at @ self._ray_of.T, costs[np.arange(len(covered)), best]
 
 
 def _turn_to(rays: Array) -> Array:

@@ -12,26 +12,28 @@ _jit = numba.njit(cache=True, nogil=True)
 
 
 @_jit
-def coverage(scene, sight, camera_T_parent, parent_T_link, covered):
-    """Fill `covered` (N, H, W) with 1 where the robot is drawn in a view, 0 elsewhere and where all views have it.
+def coverage(scene, sight, camera_T_parents, parent_T_link, covered):
+    """Fill `covered` (n, N, H, W) with 1 where the robot is drawn in a view, 0 elsewhere and where all views have it.
 
-    `scene` and `sight` are those of a `Renderer`, `parent_T_link` is (N, L, 4, 4).
+    `scene` and `sight` are those of a `Renderer`, `camera_T_parents` is (n, 4, 4), `parent_T_link` (N, L, 4, 4).
     """
     face, box = sight.face, sight.box
     views = len(parent_T_link)
     covered[:] = 0
-    for v in range(views):
-        see(scene, sight, camera_T_parent, parent_T_link[v])
+    for n in range(len(camera_T_parents)):
+        here = covered[n]
+        for v in range(views):
+            see(scene, sight, camera_T_parents[n], parent_T_link[v])
+            for y in range(box[2], box[3] + 1):
+                for x in range(box[0], box[1] + 1):
+                    here[v, y, x] = face[y, x] >= 0
         for y in range(box[2], box[3] + 1):
             for x in range(box[0], box[1] + 1):
-                covered[v, y, x] = face[y, x] >= 0
-    for y in range(box[2], box[3] + 1):
-        for x in range(box[0], box[1] + 1):
-            by = 0
-            for v in range(views):
-                by += covered[v, y, x] > 0
-            if by == views:
-                covered[:, y, x] = 0
+                by = 0
+                for v in range(views):
+                    by += here[v, y, x] > 0
+                if by == views:
+                    here[:, y, x] = 0
 
 
 @_jit

@@ -42,7 +42,9 @@ class PhotographSearchSettings:
 
     Attributes:
         distances: of the camera, in spans of the moving links.
+        coarse_cell_m: of the mesh of the coarse drawings.
         coarse_px, width_px: width of the drawings: of all poses, then of the better ones.
+        batch: poses whose drawings are correlated at once.
         better: share of the poses that the coarse drawings leave. On 16 sets of 5 to 40 photographs, real and rendered,
             the six best starts of the fine drawings were all among the first 0.008.
         views: photographs that are compared.
@@ -51,8 +53,10 @@ class PhotographSearchSettings:
     """
 
     distances: tuple[float, ...] = (1.2, 1.6, 2.1, 2.8, 3.7, 4.9)
+    coarse_cell_m: float = 0.04
     coarse_px: int = 40
     width_px: int = 80
+    batch: int = 16
     better: float = 0.05
     views: int = 5
     unchanged_cost: float = 0.7
