@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-
 from hecbench_plugins.maskless.refinement import relaxed
 from hecbench_plugins.maskless.settings import CONTOUR
 
