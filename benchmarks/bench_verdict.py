@@ -1,12 +1,12 @@
 """The verdict against the truth it never sees: choice, interval and grade, on generated, real and faulty recordings.
 
 Run: ``python benchmarks/bench_verdict.py [--recordings 200] [--seed 1000] [--keep FILE] [KIND ...]``. Kinds: the
-presets of the suite `markers`, ``real-N`` (N samples drawn from the recording given by --real), ``fault-NAME``,
-``lens`` (the distortion of the camera forgotten) and ``size`` (K of another image size). A line for each kind: how
-often the recommended answer is within 1.5 x the best method + 0.5 mm, how often the 95 % interval holds the true
-error, and the grades; rates with their 95 % intervals. With
-``--keep`` each recording is a line of a file, and what stands there is not measured again.
-A recording costs one to four seconds of a core, all kinds at 200 hours.
+presets of the suite `markers`, ``lab-LEVEL`` (markers or photographs of the suite `lab`), ``real-N`` (N samples drawn
+from the recording given by --real), ``fault-NAME``, ``lens`` (the distortion of the camera forgotten), ``size`` (K of
+another image size) and ``cameras`` (every second sample of another camera). A line for each kind: how often the
+recommended answer is within 1.5 x the best method + 0.5 mm, how often the 95 % interval holds the true error, and the
+grades; rates with their 95 % intervals. With ``--keep`` each recording is a line of a file, and what stands there is
+not measured again. A recording costs one to four seconds of a core, one of the lab thirty, all kinds at 200 hours.
 """
 
 import argparse
@@ -25,22 +25,26 @@ from hecbench_datasets.suites.synthetic_markers import make
 from hecbench_datasets.synthetic_faults import FAULTS, arm_recording
 from joblib import Parallel, delayed
 
-from hecbench import preparation, se3
+from hecbench import preparation, registry, se3
 from hecbench.recording import Mounting
 from hecbench.robots.model import load_robot
 from hecbench.running import calibrating, planning
 from hecbench.running.solving import Options
+from hecbench.specs import Kind, SuiteSpec
 from hecbench.statistics import wilson
 from hecbench.verdict import Grade
 from hecbench.workspace import apart_m, points_in_parent
 
 PRESETS = ("tag_2m", "small_tag_2m", "board_2m")
+LAB = ("lab-markers", "lab-photographs")
 REAL = tuple(f"real-{count}" for count in (8, 12, 20, 40))
 SEEDED = {f"fault-{name.replace(' ', '-')}": fault for name, fault in FAULTS.items() if fault.critical}
-WRONG = (*SEEDED, "lens", "size")
+WRONG = (*SEEDED, "lens", "size", "cameras")
 DISTORTION = np.array([-0.3, 0.1, 0.001, -0.001, 0.0])
 """Of a usual 6 mm lens, forgotten in the kind ``lens``."""
 TWICE_TOLERANCE_MM = 10.0
+OTHER_CAMERA = 10_000
+"""Added to an item's index for the camera that its samples are mixed with in the kind ``cameras``."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +66,14 @@ def recording_of(kind, index, real, seed):
         whole = replace(preparation.load_recording(real), images=None)
         count = int(kind.removeprefix("real-"))
         return whole.subset(np.sort(rng.choice(len(whole), min(count, len(whole)), replace=False)))
+    if kind in LAB:
+        lab = registry.load().get(Kind.SUITE, "lab", SuiteSpec)
+        return lab.make(kind.removeprefix("lab-"), index, seed)
+    if kind == "cameras":
+        good, other = make("board_2m", index, seed), make("board_2m", index + OTHER_CAMERA, seed)
+        corners_px, poses = good.corners_px.copy(), good.base_T_flange.copy()
+        corners_px[1::2], poses[1::2] = other.corners_px[1::2], other.base_T_flange[1::2]
+        return replace(good, corners_px=corners_px, base_T_flange=poses, camera_T_target=None)
     if kind == "lens":
         good = make("board_2m", index, seed)
         return replace(good, corners_px=with_distortion(good), camera_T_target=None)
@@ -91,7 +103,8 @@ def measured(kind, index, real, seed):
     recording = recording_of(kind, index, real, seed)
     blind = recording.without_truth()
     examined = calibrating.examine(blind)
-    specs = [spec for spec in planning.solvers_for((), blind) if not spec.slow]
+    photographs = kind == "lab-photographs"
+    specs = [spec for spec in planning.solvers_for((), blind) if photographs or not spec.slow]
     estimates = calibrating.solved(examined, specs, Options(stop_on_bad_input=False))
     found = calibrating.judged(examined, specs, estimates)
     poses = examined.segmented.recording.base_T_flange
@@ -166,6 +179,6 @@ if __name__ == "__main__":
         "--real", type=Path, default=Path(__file__).parents[2] / "shared" / "data" / "ur3e_cam1"
     )
     arguments = parser.parse_args()
-    for each in arguments.kinds or (*PRESETS, *REAL, *WRONG):
+    for each in arguments.kinds or (*PRESETS, *LAB, *REAL, *WRONG):
         counted = (arguments.recordings, arguments.jobs, arguments.real, arguments.seed, arguments.keep)
         campaign(each, all_rows(each, *counted))
