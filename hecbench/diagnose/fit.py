@@ -141,6 +141,14 @@ class Fit:
             distances / _POSE_FREEDOM / np.clip(scatter, _LEAST_SCATTER, max(robust, _LEAST_SCATTER))
         )
 
+    def exceeded(self, agreeing: NDArray[np.bool_], chance: float) -> float:
+        """The studentised distance that one of all samples exceeds with this chance although they are alike."""
+        from scipy.special import fdtri
+
+        unknowns = self.reduced[1].shape[1]
+        freedom = max(_POSE_FREEDOM * int(agreeing.sum()) - unknowns, 1)
+        return float(fdtri(_POSE_FREEDOM, freedom, 1 - chance / len(agreeing)))
+
     def subset(self, chosen: NDArray[np.integer] | NDArray[np.bool_]) -> Fit:
         """The same calibration of some of the samples."""
         problem = replace(

@@ -13,6 +13,8 @@ LIMIT_MM = 12.0
 LIMIT_DEG = 2.0
 NOTICEABLE_MM = 4.0
 NOTICEABLE_DEG = 0.5
+CHANCE = 1e-3
+"""That a good recording is called bad by its least likely sample."""
 _ALIKE = 0.8
 
 
@@ -47,7 +49,8 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
     verb = "contradicts" if len(concerned) == 1 else "contradict"
     summary = f"{names(concerned)} {verb} the other samples: the target is displaced by {off}"
     action = "look at its image and robot pose; leave it out or record it again"
-    far = odd & ((millimetres > LIMIT_MM) | (degrees > LIMIT_DEG))
+    beyond_chance = found.studentised(agreeing) > found.exceeded(agreeing, CHANCE)
+    far = odd & beyond_chance & ((millimetres > LIMIT_MM) | (degrees > LIMIT_DEG))
     severity = Severity.CRITICAL if far.any() else Severity.WARNING
     return Finding(ID, severity, summary, action, worst, limit, concerned), case
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hecbench_datasets.suites.synthetic_markers import make
 from hecbench_datasets.synthetic_faults import FAULTS
 
 from hecbench import preparation, se3
@@ -193,3 +194,11 @@ def test_camera_that_moved(shared, found):
     assert finding.severity is Severity.CRITICAL
     assert {"000001", "000002", "000003"} <= set(finding.samples)
     assert "moved" in finding.summary
+
+
+def test_a_sample_that_noise_alone_displaces_is_not_called_critical(good, found):
+    """Of 200 of these tags a sample of two has a variance ratio of 5.3, whose turn of 2 deg PnP cannot know."""
+    for index in (147, 163):
+        finding = found(make("tag_2m", index, 7714))["outlier_sample"]
+        assert finding.severity is Severity.WARNING
+        assert len(finding.samples) == 1
