@@ -103,26 +103,25 @@ class Photographs:
         """All steps but the last from a pose of the search, on the searched views."""
         pose, found = camera_T_parent, None
         for step in schedule(self.canvas.valid.shape[1])[0]:
-            found = self.refined_by(step, pose)
+            lines = self._searched.get(step) or self._searched.setdefault(
+                step, self.lines(step, self.search_views)
+            )
+            before = lines.renders
+            found = refine(lines, pose, step)
             pose = found.camera_T_parent
+            self.renders += lines.renders - before
         assert found is not None
         return found
 
-    def refined_by(
-        self, step: RefinementLevel, camera_T_parent: Array, sigmas: float = CONTOUR.settled
-    ) -> Refined:
-        """One step from a pose, on the searched views."""
-        lines = self._searched.get(step) or self._searched.setdefault(
-            step, self.lines(step, self.search_views)
-        )
-        before = lines.renders
-        found = refine(lines, camera_T_parent, step, sigmas)
-        self.renders += lines.renders - before
-        return found
-
-    def forget_sizes(self) -> None:
-        """Free what was kept for further descents."""
+    def refined_on_few(self, camera_T_parent: Array, last: RefinementLevel) -> Array:
+        """The last step on the searched views, roughly, where they are fewer than all; the smaller sizes are freed."""
         self._searched.clear()
+        if len(self.search_views) == len(self.canvas):
+            return camera_T_parent
+        lines = self.lines(last, self.search_views)
+        found = refine(lines, camera_T_parent, last, COURSE.roughly)
+        self.renders += lines.renders
+        return found.camera_T_parent
 
 
 @dataclass(frozen=True)
@@ -219,10 +218,7 @@ class Maskless:
         canvas = photographs.canvas
         _, last = schedule(canvas.valid.shape[1])
         path = [*found.path, ("refined", found.camera_T_parent)]
-        rough = found.camera_T_parent
-        if len(canvas) > len(photographs.search_views):
-            rough = photographs.refined_by(last, rough, COURSE.roughly).camera_T_parent
-        photographs.forget_sizes()
+        rough = photographs.refined_on_few(found.camera_T_parent, last)
         lines = photographs.lines(last, canvas)
         end = refine(lines, rough, last, COURSE.roughly)
         rest, left_out_m = _without_tool(lines, end, last.spacing), 0.0
