@@ -30,10 +30,22 @@ class MasksElsePhotographs:
 
     def __call__(self, recording: Recording, *, rng: np.random.Generator) -> Estimate:
         """Calibrate by masks if possible."""
-        try:
-            found = self.by_masks(recording, rng=rng)
-        except NoMask:
+        found = self._by_masks(recording, rng)
+        if found is None:
             return self.by_photographs(recording, rng=rng)
+        if found.diagnostics.get("stage") != "coverage":
+            return found
+        return self._from(found.parent_T_camera, recording, rng) or found
+
+    def _by_masks(self, recording: Recording, rng: np.random.Generator) -> Estimate | None:
+        """The answer by masks, None where the photographs are to be asked instead.
+
+        On its own: an exception that is being handled keeps the pictures of its frames in memory.
+        """
+        try:
+            return self.by_masks(recording, rng=rng)
+        except NoMask:
+            return None
         except RaggedMasks as failure:
             seen = self._from(failure.parent_T_camera, recording, rng)
             if seen is None:
@@ -42,10 +54,7 @@ class MasksElsePhotographs:
         except SolverFailure:
             if Need.MASKS in recording.offers():
                 raise
-            return self.by_photographs(recording, rng=rng)
-        if found.diagnostics.get("stage") != "coverage":
-            return found
-        return self._from(found.parent_T_camera, recording, rng) or found
+            return None
 
     def _from(
         self, parent_T_camera: Array | None, recording: Recording, rng: np.random.Generator
