@@ -6,6 +6,8 @@ Run: ``python benchmarks/paper_page.py``.
 import json
 from pathlib import Path
 
+from paper_campaigns import sections
+
 from hecbench.report import paper
 
 DOCS = Path(__file__).resolve().parents[1] / "docs"
@@ -15,13 +17,15 @@ GROUP = "lit"
 
 HEAD = """# The paper's claims
 
-This page is written by `python benchmarks/paper_page.py` from [`data/translation.json`](data/translation.json), which
-holds the command, commit and date of its figures. It covers Tables III and IX. Tables I and VI to VIII stand in
-[first-order methods](first-order.md) and [studies](studies.md), Tables IV and V in [trials](trials.md). Table II
-cannot be compared on its own set: the Baxter recordings are not public.
+This page is written by `python benchmarks/paper_page.py` from [`data/campaigns.json`](data/campaigns.json) and
+[`data/translation.json`](data/translation.json), which hold the command, commit and date of their figures. The
+first-order methods of Table I and Tables VI to VIII stand in [first-order methods](first-order.md) and
+[studies](studies.md), Table V in [trials](trials.md). Table II cannot be compared on its own set: the Baxter recordings
+are not public.
 
-Brackets hold the 95 % bootstrap interval of the mean. The paper's numbers are of its own photographs; ours are of
-pictures of a UR5e drawn with lamps, shadows and clutter (`lit_ur5e_1_*`), cut out by their masks.
+Brackets hold 95 % intervals: of means and medians by the bootstrap, of rates by Wilson. For Tables III and IX the
+paper's numbers are of its own photographs; ours are of pictures of a UR5e drawn with lamps, shadows and clutter
+(`lit_ur5e_1_*`), cut out by their masks.
 """
 
 
@@ -37,6 +41,11 @@ def ours(figures, scale=1.0):
         value, low, high = (number / by for number in figures[name])
         found.append(f"{value:.4g} [{low:.4g}, {high:.4g}]")
     return " | ".join(found)
+
+
+def apart(first, second, larger):
+    """Whether the interval of the first (value, low, high) lies on the better side of the second's."""
+    return first[1] > second[2] if larger else first[2] < second[1]
 
 
 def table(lines):
@@ -58,12 +67,13 @@ def table_three(found, steps):
     if trained and "learned" in found:
         columns = ("mse", "mae", "iou", "psnr", "ssim")
         better = [
-            column.upper()
-            for column, larger in zip(columns, LARGER_IS_BETTER, strict=True)
-            if all((found["learned"][column][0] > found[name][column][0]) is larger for name in trained)
+            title
+            for title, column, larger in zip(COLUMNS, columns, LARGER_IS_BETTER, strict=True)
+            if all(apart(found["learned"][column], found[name][column], larger) for name in trained)
         ]
         verdict = (
-            f"`learned` is better than all {len(trained)} trained translators in {', '.join(better) or 'nothing'}. The"
+            f"`learned` is better than all {len(trained)} trained translators, its interval apart from theirs, in"
+            f" {', '.join(better) or 'nothing'}; elsewhere the intervals overlap. The"
             " translators were trained at 64 px for a fraction of the paper's 588,000 steps on 256 px, so their rows"
             " say nothing of the methods at full size: cannot be compared."
         )
@@ -95,7 +105,8 @@ def main():
     data = json.loads((DOCS / "data" / "translation.json").read_text())
     found = {key.partition(", ")[2]: value for key, value in data.items() if key.startswith(f"{GROUP}, ")}
     steps = {name: value.get("trained", "") for name, value in found.items()}
-    lines = [HEAD, *table_three(found, steps), *table_nine(found)]
+    campaigns = json.loads((DOCS / "data" / "campaigns.json").read_text())
+    lines = [HEAD, *sections(campaigns), *table_three(found, steps), *table_nine(found)]
     (DOCS / "paper.md").write_text("\n".join(lines).rstrip() + "\n")
 
 
