@@ -37,6 +37,8 @@ class Keypoints:
         model: a perception plugin or the folder of a trained network; None: one that knows the robot.
         refine: whether the camera is aligned with the network's masks from there, by `render_gn`'s first stages; where
             these end without an answer, that of the keypoints stays.
+        refined_views: views that are aligned at most, spread evenly: time grows with them, and the masks are off alike in
+            all.
         least_trust: of a keypoint's heatmap that must lie at one place.
         limit_px: a keypoint farther than this from where the pose puts it is wrong, in pixels of a 640 px wide picture.
         rounds: of RANSAC.
@@ -48,6 +50,7 @@ class Keypoints:
 
     model: str | None = None
     refine: bool = False
+    refined_views: int = 10
     least_trust: float = 0.2
     limit_px: float = 20.0
     rounds: int = 1000
@@ -107,7 +110,7 @@ class Keypoints:
                 "rms_px": answer.rms * float(camera.intrinsics[0, 0]),
             },
         )
-        return _aligned(found, recording, masks, rng) if self.refine else found
+        return _aligned(found, recording, masks, self.refined_views, rng) if self.refine else found
 
     def _sightings(self, recording: Recording) -> tuple[Sightings, int, list[Mask | None]]:
         """Every trusted keypoint of every image that has joints, how many such images there are, and their masks."""
@@ -150,16 +153,20 @@ class Keypoints:
 
 
 def _aligned(
-    found: Estimate, recording: Recording, masks: list[Mask | None], rng: np.random.Generator
+    found: Estimate, recording: Recording, masks: list[Mask | None], views: int, rng: np.random.Generator
 ) -> Estimate:
-    """The answer aligned with the masks, or as it was, and in `refined` which of the two."""
+    """The answer aligned with the masks of some views, or as it was, and in `refined` which of the two."""
     from hecbench_plugins.perception.choice import robot_of
     from hecbench_plugins.second_order.render_gn import RenderGN
 
     robot = recording.present.robot
     if robot.model is not None:
         robot = replace(robot, model=robot_of(recording))
-    ready = replace(recording, masks=tuple(masks), robot=robot, initial_parent_T_camera=found.parent_T_camera)
+    masked = np.flatnonzero([mask is not None for mask in masks])
+    chosen = masked[np.unique(np.linspace(0, len(masked) - 1, views).round().astype(int))]
+    ready = replace(
+        recording, masks=tuple(masks), robot=robot, initial_parent_T_camera=found.parent_T_camera
+    ).subset(chosen)
     try:
         aligned = RenderGN()(ready, rng=rng)
     except (Refusal, SolverFailure) as reason:
