@@ -78,7 +78,7 @@ def load_weights(net: nn.Module, tensors: dict[str, Tensor], prefix: str, path: 
 
 
 def load_moments(optimiser: Any, net: nn.Module, tensors: dict[str, Tensor]) -> None:
-    """Put the optimiser's moments back."""
+    """Put the optimiser's moments back, laid out in memory as the weights are: the fused step assumes that."""
     for name, weight in net.named_parameters():
         moments = {
             moment: tensors[f"{moment}/{name}"]
@@ -87,7 +87,7 @@ def load_moments(optimiser: Any, net: nn.Module, tensors: dict[str, Tensor]) -> 
         }
         if moments:
             optimiser.state[weight] = {
-                k: v if k == "step" else v.to(weight.device) for k, v in moments.items()
+                k: v if k == "step" else torch.empty_like(weight).copy_(v) for k, v in moments.items()
             }
 
 

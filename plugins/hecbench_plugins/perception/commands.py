@@ -16,8 +16,8 @@ _FOLDER = click.Path(path_type=Path, file_okay=False)
 _NEEDED = ("torch", "safetensors", "onnx")
 
 
-def _require_torch() -> None:
-    missing = [name for name in _NEEDED if find_spec(name) is None]
+def _require_torch(*others: str) -> None:
+    missing = [name for name in (*_NEEDED, *others) if find_spec(name) is None]
     if missing:
         raise InputError(f"training needs {' and '.join(missing)}: pip install 'hecbench[torch]'")
 
@@ -80,6 +80,60 @@ def perception(
     with _room_on_disk(out):
         training.run()
         from hecbench_plugins.perception.product import write_model
+
+        click.echo(f"{write_model(training)}: the model, its card and its curve")
+
+
+@train.command()
+@click.option("--robot", required=True, help="A known robot or a URDF file.")
+@click.option("--out", required=True, type=_FOLDER, help="Folder of the run; a run found there goes on.")
+@click.option("--hours", default=1.0, show_default=True, help="End after this time.")
+@click.option("--steps", type=int, help="End after so many steps, if that is sooner.")
+@click.option("--seed", default=0, show_default=True)
+@click.option("--batch", default=24, show_default=True, help="Pictures per step.")
+@click.option("--threads", default=1, show_default=True, help="Of the processor.")
+@click.option(
+    "--start-from",
+    type=click.Path(path_type=Path),
+    help="A checkpoint, or the folder of a perception model that has learned to see the robot.",
+)
+@click.option("--backgrounds", type=_FOLDER, help="Folder of photographs without a robot, drawn behind it.")
+def regression(
+    robot: str,
+    out: Path,
+    hours: float,
+    steps: int | None,
+    seed: int,
+    batch: int,
+    threads: int,
+    start_from: Path | None,
+    backgrounds: Path | None,
+) -> None:
+    """Train the network that answers the camera's pose from one picture, and write it as OUT/model.
+
+    The run needs no data. It may be stopped at any moment: the same command goes on from its last checkpoint.
+    """
+    _require_torch("pytorch_kinematics")
+    from hecbench_plugins.regression.plan import Plan
+
+    plan = Plan(
+        (robot,),
+        out,
+        hours,
+        steps,
+        seed=seed,
+        batch=batch,
+        threads=threads,
+        start_from=start_from,
+        backgrounds=backgrounds,
+    )
+    plan.check()
+    from hecbench_plugins.regression.training import Training
+
+    training = Training(plan, click.echo)
+    with _room_on_disk(out):
+        training.run()
+        from hecbench_plugins.regression.product import write_model
 
         click.echo(f"{write_model(training)}: the model, its card and its curve")
 

@@ -14,6 +14,7 @@ from hecbench.errors import InputError
 from hecbench.se3 import Array
 from hecbench_plugins.perception.card import ModelCard, read_card
 from hecbench_plugins.perception.plan import STRIDE
+from hecbench_plugins.perception.shrinking import softened
 from hecbench_plugins.perception.skeleton import keypoint_positions
 
 Floats = NDArray[np.float32]
@@ -22,9 +23,6 @@ _COARSE_PX, _FINE_PX = (320, 448), (224, 288)
 """The longer sides of the picture in the first and second pass; the answers of a pass are averaged."""
 _FILL = 0.78
 """Share of the second pass's picture that the robot takes."""
-_SMOOTHING = 0.35
-"""Standard deviation of the blur before shrinking, in pixels of the small picture: it keeps aliases out."""
-_BLUR_BELOW = 0.6
 _ROBOT = 0.5
 _PIECE = 0.3
 """Of the largest piece's area: smaller pieces are not the robot."""
@@ -178,10 +176,8 @@ class PerceptionModel:
         size = np.maximum(np.ceil(side * scale / STRIDE - 1e-6), 1).astype(int) * STRIDE
         corner = (box[:2] + box[2:]) / 2 - size / scale / 2
         pixel_T_small = np.c_[np.eye(2) / scale, 0.5 / scale + corner - 0.5]
-        if scale < _BLUR_BELOW:
-            image = np.asarray(cv2.GaussianBlur(image, (0, 0), _SMOOTHING / scale), np.uint8)
         small = cv2.warpAffine(
-            image,
+            softened(image, scale),
             pixel_T_small,
             (int(size[0]), int(size[1])),
             flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,

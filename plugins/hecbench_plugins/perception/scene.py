@@ -40,6 +40,8 @@ class Scene:
     """An arm before a camera, drawn `SUPERSAMPLING` times as large as the picture."""
 
     arm: Arm
+    joints_rad: Array
+    """(J,) of the model's joints."""
     base_T_link: Array
     camera_T_base: Array
     K: Array
@@ -75,7 +77,7 @@ def supersampled(K: Array) -> Array:
 
 def random_scene(arm: Arm, size: int, rng: Rng) -> Scene:
     """A posture and a camera that sees at least some of it."""
-    base_T_link = random_posture(arm, rng)
+    joints_rad, base_T_link = random_posture(arm, rng)
     points = arm.keypoint_positions(base_T_link)
     while True:
         camera_T_base, K = random_camera(points, size, rng)
@@ -83,11 +85,11 @@ def random_scene(arm: Arm, size: int, rng: Rng) -> Scene:
         renderer = Renderer(arm.mesh, supersampled(K), side, side)
         renderer.rasterise(camera_T_base @ base_T_link)
         if renderer.dropped == 0 and (renderer.face >= 0).mean() > _LEAST_COVER:
-            return Scene(arm, base_T_link, camera_T_base, K, size, renderer)
+            return Scene(arm, joints_rad, base_T_link, camera_T_base, K, size, renderer)
 
 
-def random_posture(arm: Arm, rng: Rng) -> Array:
-    """root_T_link (L, 4, 4) within the joint limits and above the floor."""
+def random_posture(arm: Arm, rng: Rng) -> tuple[Array, Array]:
+    """Joints (J,) rad within their limits, above the floor, and root_T_link (L, 4, 4)."""
     limits = np.clip(arm.model.limits(), -np.pi, np.pi)
     foot = len({k.link for k in arm.keypoints[:2]}) + 1
     for _ in range(_TRIES):
@@ -99,7 +101,7 @@ def random_posture(arm: Arm, rng: Rng) -> Array:
         points = arm.keypoint_positions(root_T_link)
         if points[foot:, 2].min(initial=np.inf) > _LOWEST_M and _closest(points) > _APART_M:
             break
-    return np.asarray(root_T_link)
+    return q, np.asarray(root_T_link)
 
 
 def _closest(points: Array) -> float:

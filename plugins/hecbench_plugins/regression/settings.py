@@ -1,0 +1,23 @@
+"""The settings of the solver `regression`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+SHIPPED = Path(__file__).parents[1] / "networks" / "weights_regression_ur5e"
+"""The network that comes with this package; its card is in there."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What decides an answer.
+
+    Attributes:
+        model: the folder of a trained network.
+        largest_spread_rad: of the rotation that one view answers, about one axis, above which the views contradict
+            each other: two thirds of a radian, where a network that guesses is as often wrong as right.
+    """
+
+    model: Path = SHIPPED
+    largest_spread_rad: float = 0.6

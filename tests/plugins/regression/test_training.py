@@ -1,0 +1,172 @@
+"""Training at a toy's size: its parts are right, a stop changes nothing, and a solver runs what it leaves."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+torch = pytest.importorskip("torch")
+pytest.importorskip("safetensors")
+pytest.importorskip("onnx")
+pytest.importorskip("pytorch_kinematics")
+
+import cv2  # noqa: E402
+from hecbench_plugins.networks.ur import WEIGHTS  # noqa: E402
+from hecbench_plugins.perception.skeleton import keypoint_positions, keypoints_of  # noqa: E402
+from hecbench_plugins.regression.kinematics import Kinematics  # noqa: E402
+from hecbench_plugins.regression.losses import losses  # noqa: E402
+from hecbench_plugins.regression.onnx_export import to_onnx  # noqa: E402
+from hecbench_plugins.regression.plan import Plan  # noqa: E402
+from hecbench_plugins.regression.product import write_model  # noqa: E402
+from hecbench_plugins.regression.training import Training  # noqa: E402
+from hecbench_plugins.solvers.regression import regression  # noqa: E402
+
+from hecbench import se3  # noqa: E402
+from hecbench.errors import InputError, Refusal, SolverFailure  # noqa: E402
+from hecbench.lens import CameraModel  # noqa: E402
+from hecbench.recording import Mounting, Recording, RobotDescription  # noqa: E402
+from hecbench.robots.model import load_robot  # noqa: E402
+
+K = np.array([[300.0, 0, 159.5], [0, 300, 119.5], [0, 0, 1]])
+
+
+def plan(out, robot, **changes):
+    settings = {"hours": 1.0, "steps": 4, "size": 64, "batch": 4, "capacity": 6, **changes}
+    return Plan((str(robot),), out, **settings)
+
+
+def silent(line):
+    pass
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory, crane):
+    training = Training(plan(tmp_path_factory.mktemp("run"), crane), silent)
+    training.run()
+    return training
+
+
+@pytest.fixture(scope="module")
+def folder(run):
+    return write_model(run)
+
+
+def test_a_run_that_was_stopped_ends_as_one_that_was_not(run, crane, tmp_path):
+    first = Training(plan(tmp_path, crane), silent)
+    first.net.train()
+    first.prepare()
+    for _ in range(2):
+        first._step(first._done())
+    first.save()
+    lines = []
+    second = Training(plan(tmp_path, crane), lines.append)
+    assert "goes on after step 2" in lines[0]
+    second.run()
+    assert second.progress.step == run.progress.step == 4
+    for name, value in run.net.state_dict().items():
+        assert torch.equal(second.net.state_dict()[name], value), name
+    for name, value in run.average.items():
+        assert torch.equal(second.average[name], value), name
+
+
+@pytest.mark.parametrize("name", ["ur5e", "ur3e"])
+def test_batched_kinematics_are_the_projects_own(name):
+    model = load_robot(name, meshes=False)
+    keypoints = keypoints_of(load_robot(name))
+    low, high = np.clip(model.limits(), -np.pi, np.pi).T
+    joints = np.random.default_rng(0).uniform(low, high, (30, 6))
+    root_T_link, points = Kinematics(model, keypoints)(torch.from_numpy(joints), "shoulder_link")
+    poses = model.link_poses(joints)
+    expected = poses[:, model.link_index("shoulder_link")]
+    np.testing.assert_allclose(root_T_link, expected, atol=1e-6)
+    local = se3.inverse(expected)[:, None] @ poses
+    np.testing.assert_allclose(points, keypoint_positions(model.links, keypoints, local), atol=1e-6)
+
+
+def test_the_truth_of_every_picture_costs_nothing(run):
+    batch = run.shots.batch(np.random.default_rng(1))
+    across, down, depth = batch.crop_middle.unbind(1)
+    R = batch.crop_R_reference
+    numbers = torch.stack(
+        [across / depth * batch.focal, down / depth * batch.focal, (depth / batch.focal).log()], 1
+    )
+    right = torch.cat([numbers, R[:, :, 0], R[:, :, 1]], 1)
+    assert losses(right, *batch[2:]).total() < 0.02
+    assert losses(right + 0.1, *batch[2:]).total() > 0.1
+
+
+def test_the_encoder_of_a_perception_model_answers_as_it_does_there(tmp_path):
+    training = Training(plan(tmp_path, "ur5e", start_from=WEIGHTS), silent)
+    batch = training.shots.batch(training._rng())
+    graph = cv2.dnn.readNetFromONNX(str(WEIGHTS / "perception.onnx"))
+    graph.setInput(batch.pictures[:1].numpy())
+    layer = next(name for name in graph.getLayerNames() if "/down.3/down.3.1/Relu" in name)
+    expected = graph.forward(layer)
+    x = training.net.look(batch.pictures)
+    for block in training.net.down:
+        x = block(x)
+    np.testing.assert_allclose(x[:1].detach(), expected, atol=0.02 * np.abs(expected).max())
+
+
+def test_the_graph_answers_as_the_network_does(run):
+    net = run.averaged_network().eval()
+    image, posture = torch.rand(1, 3, 128, 128), torch.rand(1, 2)
+    graph = cv2.dnn.readNetFromONNX(np.frombuffer(to_onnx(net, 2), np.uint8))
+    graph.setInput(image.numpy(), "image")
+    graph.setInput(posture.numpy(), "posture")
+    with torch.no_grad():
+        np.testing.assert_allclose(graph.forward(), net(image, posture).numpy(), atol=0.01)
+
+
+def photographed(robot, **changes):
+    recording = Recording(
+        name="cell",
+        mounting=Mounting.EYE_TO_HAND,
+        sample_ids=("0", "1"),
+        robot=RobotDescription(urdf=robot, base_link="foot", flange_link="fore"),
+        camera=CameraModel(320, 240, K),
+        joints_rad=np.array([[0.1, 0.4], [1.0, -0.5]]),
+        images=tuple(np.random.default_rng(0).integers(0, 255, (2, 240, 320, 3)).astype(np.uint8)),
+    )
+    return replace(recording, **changes)
+
+
+def solved(recording, model):
+    return regression(model)(recording, rng=np.random.default_rng(0))
+
+
+def test_a_solver_answers_by_the_folder(folder, crane, monkeypatch):
+    assert {path.name for path in folder.iterdir()} == {
+        "README.md", "model.json", "regression.onnx", "curve.csv", "curve.png", "samples.png",
+    }  # fmt: skip
+    assert (folder / "regression.onnx").stat().st_size < 6e6
+    estimate = solved(photographed(crane), folder)
+    assert estimate.diagnostics["views"] == 2
+    assert se3.is_transform(estimate.parent_T_camera)
+    assert (np.linalg.eigvalsh(estimate.covariance) > 0).all()
+    swapped = photographed(crane)
+    robot = replace(swapped.robot, joint_names=("bend", "turn"))
+    swapped = replace(swapped, robot=robot, joints_rad=swapped.joints_rad[:, ::-1])
+    np.testing.assert_allclose(solved(swapped, folder).parent_T_camera, estimate.parent_T_camera, atol=1e-9)
+
+
+def test_what_cannot_be_answered_is_said_in_one_line(folder, crane, tmp_path):
+    recording = photographed(crane)
+    with pytest.raises(SolverFailure, match=r"model\.json"):
+        solved(recording, tmp_path)
+    with pytest.raises(SolverFailure, match="the robot is ur5e, and the network knows crane"):
+        solved(replace(recording, robot=RobotDescription(model="ur5e")), folder)
+    with pytest.raises(Refusal, match="on the flange"):
+        solved(replace(recording, mounting=Mounting.EYE_IN_HAND), folder)
+    with pytest.raises(Refusal, match="no image has joints"):
+        solved(replace(recording, images=(None, None)), folder)
+    for file in folder.iterdir():
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    (tmp_path / "regression.onnx").write_bytes(b"nonsense")
+    with pytest.raises(SolverFailure, match="not the file that"):
+        solved(recording, tmp_path)
+
+
+def test_a_run_for_two_robots_is_refused(tmp_path):
+    with pytest.raises(InputError, match="--robot: this network is for one robot"):
+        Plan(("ur5e", "ur3e"), tmp_path, 1.0).check()
