@@ -90,7 +90,7 @@ def perception(
 @click.option("--hours", default=1.0, show_default=True, help="End after this time.")
 @click.option("--steps", type=int, help="End after so many steps, if that is sooner.")
 @click.option("--seed", default=0, show_default=True)
-@click.option("--batch", default=24, show_default=True, help="Pictures per step.")
+@click.option("--batch", default=16, show_default=True, help="Pictures per step.")
 @click.option("--threads", default=1, show_default=True, help="Of the processor.")
 @click.option(
     "--start-from",

@@ -35,21 +35,7 @@ class Residual(nn.Module):
         return F.relu(x + self.b(self.a(x)))
 
 
-class Encoder(nn.Module):
-    """The half of a network that looks: features at 1/2, 1/4, ... of the picture's size, `WIDTHS` of them."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.stem = ConvUnit(3, WIDTHS[0], 2)
-        self.down = nn.ModuleList(nn.Sequential(ConvUnit(a, b, 2), Residual(b)) for a, b in pairwise(WIDTHS))
-
-    def look(self, x: Tensor) -> Tensor:
-        """(B, 16, H/2, W/2) of pictures (B, 3, H, W) RGB in [0, 1]; the blocks of `down` go on from there."""
-        out: Tensor = self.stem(x * 4 - 2)
-        return out
-
-
-class PerceptionNet(Encoder):
+class PerceptionNet(nn.Module):
     """(B, 3, H, W) RGB in [0, 1] to logits (B, classes + 1 + keypoints, H/2, W/2).
 
     The first `classes` compete: background and colours of the whole robot. Then the visible robot, and one heatmap
@@ -60,13 +46,15 @@ class PerceptionNet(Encoder):
         super().__init__()
         self.classes, self.keypoints = classes, keypoints
         steps = list(pairwise(WIDTHS))
+        self.stem = ConvUnit(3, WIDTHS[0], 2)
+        self.down = nn.ModuleList(nn.Sequential(ConvUnit(a, b, 2), Residual(b)) for a, b in steps)
         self.side = nn.ModuleList(nn.Conv2d(b, a, 1) for a, b in steps)
         self.up = nn.ModuleList(ConvUnit(a, a if place else LAST_WIDTH) for place, (a, _) in enumerate(steps))
         self.head = nn.Conv2d(LAST_WIDTH, classes + 1 + keypoints, 1)
 
     def forward(self, x: Tensor) -> Tensor:
         """Logits of pictures whose sides are multiples of `plan.STRIDE`."""
-        levels = [self.look(x)]
+        levels = [self.stem(x * 4 - 2)]
         for block in self.down:
             levels.append(block(levels[-1]))
         y = levels.pop()

@@ -11,7 +11,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 from torch.nn.utils.fusion import fuse_conv_bn_eval
 
-from hecbench_plugins.perception.network import ConvUnit, PerceptionNet
+from hecbench_plugins.perception.network import ConvUnit
 from hecbench_plugins.perception.plan import STRIDE
 
 _OPSET = 13
@@ -49,7 +49,7 @@ class _HalfLinear(nn.Module):
         return F.linear(x, self.weight.float(), self.bias)
 
 
-def to_onnx(net: PerceptionNet) -> bytes:
+def to_onnx(net: nn.Module) -> bytes:
     """The graph: `image` (1, 3, H, W) RGB in [0, 1] to `logits`, any H and W that are multiples of 32."""
     return graph_of(halved(net), 2 * STRIDE, any_size=True)
 

@@ -1,57 +1,70 @@
-"""The network: the encoder of the perception network, told of the posture, and dense layers to nine numbers."""
+"""The network: convolutions to where the robot's keypoints may be, and dense layers from there to nine numbers."""
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import torch
 from torch import Tensor, nn
-from torch.nn import functional as F
 
-from hecbench_plugins.perception.network import WIDTHS, Encoder
-from hecbench_plugins.perception.plan import STRIDE
+from hecbench_plugins.perception.network import PerceptionNet
 from hecbench_plugins.regression.answer import NUMBERS
 from hecbench_plugins.regression.plan import CROP_PX
 
-_POSTURE_WIDTH, _SQUEEZED, _DENSE = 64, 48, 256
-_CELLS = CROP_PX // STRIDE
-"""Of the last features, along each side."""
-_FIRST_SCALE = 0.1
+_WIDTH = 384
+"""Of the dense layers."""
+_LEAST_VARIANCE = 1e-6
+"""Of a keypoint's place, as a share of the side, squared."""
 
 
-class RegressionNet(Encoder):
-    """Pictures (B, 3, S, S) RGB in [0, 1] and postures (B, P) to numbers (B, 9); see `answer`.
+class Dense(nn.Module):
+    """Places (B, 3 K) of keypoints and postures (B, P) to numbers (B, 9); see `answer`."""
 
-    The posture shifts and scales the features before the last block (Perez et al. 2018, "FiLM"), and joins them in
-    the dense layers.
+    def __init__(self, keypoints: int, posture: int) -> None:
+        super().__init__()
+        widths = (3 * keypoints + posture, _WIDTH, _WIDTH, _WIDTH)
+        layers = [nn.Sequential(nn.Linear(a, b), nn.ReLU()) for a, b in pairwise(widths)]
+        self.layers = nn.Sequential(*layers, nn.Linear(_WIDTH, NUMBERS))
+
+    def forward(self, places: Tensor, posture: Tensor) -> Tensor:
+        """The nine numbers."""
+        out: Tensor = self.layers(torch.cat([places, posture], 1))
+        return out
+
+
+class RegressionNet(PerceptionNet):
+    """Pictures (B, 3, S, S) RGB in [0, 1] and postures (B, P) to numbers (B, 9).
+
+    The convolutions are those of the perception network, whose weights may be their start. Between them and the
+    dense layers each heatmap becomes its mean place and its spread (spatial softmax, Levine et al. 2016).
     """
 
-    def __init__(self, posture: int) -> None:
-        super().__init__()
-        self.posture = nn.Sequential(nn.Linear(posture, _POSTURE_WIDTH), nn.ReLU())
-        self.film = nn.Linear(_POSTURE_WIDTH, 2 * WIDTHS[-2])
-        self.squeeze = nn.Conv2d(WIDTHS[-1], _SQUEEZED, 1)
-        self.dense = nn.Sequential(
-            nn.Linear(_SQUEEZED * _CELLS**2 + _POSTURE_WIDTH, _DENSE),
-            nn.ReLU(),
-            nn.Linear(_DENSE, _DENSE),
-            nn.ReLU(),
-            nn.Linear(_DENSE, NUMBERS),
-        )
-        nn.init.zeros_(self.film.weight)
-        nn.init.zeros_(self.film.bias)
-        last = self.dense[-1]
-        assert isinstance(last, nn.Linear)
-        with torch.no_grad():
-            last.weight.mul_(_FIRST_SCALE)
-            last.bias.copy_(torch.tensor([0.0, 0, 0, 1, 0, 0, 0, 0, -1]))
+    def __init__(self, classes: int, keypoints: int, posture: int) -> None:
+        super().__init__(classes, keypoints)
+        self.dense = Dense(keypoints, posture)
+        self.register_buffer("grid", grid_of(CROP_PX // 2), persistent=False)
 
-    def forward(self, image: Tensor, posture: Tensor) -> Tensor:
+    def forward(self, x: Tensor, posture: Tensor) -> Tensor:  # type: ignore[override]
         """The nine numbers."""
-        x = self.look(image)
-        for block in self.down[:-1]:
-            x = block(x)
-        known = self.posture(posture)
-        scale, shift = self.film(known)[:, :, None, None].chunk(2, 1)
-        x = self.down[-1](x * (1 + scale) + shift)
-        x = F.relu(self.squeeze(x)).flatten(1)
-        out: Tensor = self.dense(torch.cat([x, known], 1))
+        out: Tensor = self.dense(self.places(x), posture)
         return out
+
+    def places(self, x: Tensor) -> Tensor:
+        """(B, 3 K), as `places_of` has them, in pictures."""
+        assert isinstance(self.grid, Tensor)
+        return places_of(super().forward(x)[:, self.classes + 1 :].float(), self.grid)
+
+
+def grid_of(cells: int) -> Tensor:
+    """(S * S, 3): each cell's place across and down from the middle, shares of the side, and its square from there."""
+    axis = (torch.arange(cells) + 0.5) / cells - 0.5
+    down, across = torch.meshgrid(axis, axis, indexing="ij")
+    return torch.stack([across, down, across**2 + down**2], -1).flatten(0, 1)
+
+
+def places_of(heat: Tensor, grid: Tensor) -> Tensor:
+    """(B, 3 K): across and down from the middle, then the spread, shares of the side, of heatmaps (B, K, S, S)."""
+    moments = heat.flatten(2).softmax(2) @ grid
+    across, down = moments[..., 0], moments[..., 1]
+    variance = (moments[..., 2] - across * across - down * down).clamp(min=_LEAST_VARIANCE)
+    return torch.cat([across, down, variance.sqrt()], 1)

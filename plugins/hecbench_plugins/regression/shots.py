@@ -13,14 +13,9 @@ from hecbench.lens import CameraModel
 from hecbench_plugins.perception.family import Family
 from hecbench_plugins.perception.pictures import Example, PictureMaker, Truth
 from hecbench_plugins.regression.kinematics import Kinematics
-from hecbench_plugins.regression.plan import CROP_PX, Plan
+from hecbench_plugins.regression.plan import ASIDE, CROP_PX, ROLL_RAD, SHARE, Plan
 from hecbench_plugins.regression.reference import posture, reference_link
 from hecbench_plugins.regression.virtual_camera import VirtualCamera
-
-_SHARE = (0.35, 1.15)
-"""Of the crop's side that the robot takes, on a logarithmic scale: less in a whole picture, more where it leaves it."""
-_ASIDE, _ROLL_RAD = 0.1, 0.2
-"""Standard deviations of where the robot's middle is, as a share of the side, and of the camera's roll."""
 
 
 class Batch(NamedTuple):
@@ -89,8 +84,8 @@ class Shots:
 
 
 def _view(points: NDArray[np.float64], rng: np.random.Generator) -> VirtualCamera:
-    share = float(np.exp(rng.uniform(*np.log(_SHARE))))
-    return VirtualCamera.at(points, share, rng.normal(0, _ASIDE, 2), float(rng.normal(0, _ROLL_RAD)))
+    share = float(np.exp(rng.uniform(*np.log(SHARE))))
+    return VirtualCamera.at(points, share, rng.normal(0, ASIDE, 2), float(rng.normal(0, ROLL_RAD)))
 
 
 def _camera(truth: Truth, size: int) -> CameraModel:

@@ -12,50 +12,55 @@ from torch import Tensor, nn
 
 from hecbench.errors import InputError
 from hecbench_plugins.perception.card import read_card
-from hecbench_plugins.perception.network import ConvUnit, Encoder
+from hecbench_plugins.perception.network import ConvUnit, PerceptionNet
 
 
-def take_encoder(net: Encoder, folder: Path, pictures: Tensor) -> None:
-    """Give a network the encoder of the perception model in a folder.
+def take_sight(net: PerceptionNet, folder: Path, pictures: Tensor) -> None:
+    """Give a network the convolutions of the perception model in a folder.
 
     The model's normalisations are part of its convolutions. They are set anew so that on pictures (B, 3, H, W) the
-    encoder answers as the model's does.
+    network sees as the model does.
 
     Raises:
         InputError: the folder holds no such model.
     """
     card, weights = read_card(folder)
     graph = onnx.load_model_from_string(weights).graph
-    stored = {one.name: numpy_helper.to_array(one).astype(np.float32) for one in graph.initializer}
-    units = {name: unit for name, unit in net.named_modules() if isinstance(unit, ConvUnit)}
-    absent = [name for name in units if f"{name}.0.weight" not in stored]
-    if absent:
-        raise InputError(f"{folder / card.weights}: has no weights of '{absent[0]}': another kind of network")
-    hooks = []
-    for name, unit in units.items():
-        conv, norm = unit[0], unit[1]
-        assert isinstance(conv, nn.Conv2d)
-        conv.weight.data.copy_(torch.from_numpy(stored[f"{name}.0.weight"]))
-        hooks.append(norm.register_forward_pre_hook(_keeping(torch.from_numpy(stored[f"{name}.0.bias"]))))
+    stored = {
+        one.name: torch.from_numpy(numpy_helper.to_array(one).astype(np.float32)) for one in graph.initializer
+    }
+    hooks, fused = [], set()
+    try:
+        for name, module in net.named_modules():
+            if isinstance(module, ConvUnit):
+                hooks.append(module[1].register_forward_pre_hook(_Keeping(stored[f"{name}.0.bias"])))
+                fused.add(f"{name}.0")
+            elif isinstance(module, nn.Conv2d):
+                module.weight.data.copy_(stored[f"{name}.weight"])
+                if name not in fused:
+                    assert module.bias is not None
+                    module.bias.data.copy_(stored[f"{name}.bias"])
+    except (KeyError, RuntimeError) as error:
+        raise InputError(f"{folder / card.weights}: weights of another network: {error}") from None
     net.train()
     with torch.no_grad():
-        x = net.look(pictures)
-        for block in net.down:
-            x = block(x)
+        PerceptionNet.forward(net, pictures)
     for hook in hooks:
         hook.remove()
 
 
-def _keeping(bias: Tensor):  # type: ignore[no-untyped-def]  # noqa: ANN202
-    """A hook that sets a normalisation so that it only adds a bias (C,) to the features it is given first."""
+class _Keeping:
+    """Sets a normalisation so that it only adds a bias (C,) to the features that it is given first."""
 
-    def hook(norm: nn.BatchNorm2d, given: tuple[Tensor]) -> None:
-        variance, mean = torch.var_mean(given[0], (0, 2, 3), correction=0)
-        norm.weight.data.copy_((variance + norm.eps).sqrt())
-        norm.bias.data.copy_(bias + mean)
+    def __init__(self, bias: Tensor) -> None:
+        self.bias = bias
+
+    def __call__(self, norm: nn.Module, given: tuple[Tensor]) -> None:
+        assert isinstance(norm, nn.BatchNorm2d)
         assert norm.running_mean is not None
         assert norm.running_var is not None
+        variance, mean = torch.var_mean(given[0], (0, 2, 3), correction=0)
+        norm.weight.data.copy_((variance + norm.eps).sqrt())
+        norm.bias.data.copy_(self.bias + mean)
         norm.running_mean.copy_(mean)
         norm.running_var.copy_(variance)
-
-    return hook

@@ -12,12 +12,16 @@ pytest.importorskip("pytorch_kinematics")
 
 import cv2  # noqa: E402
 from hecbench_plugins.networks.ur import WEIGHTS  # noqa: E402
+from hecbench_plugins.perception.family import Family  # noqa: E402
+from hecbench_plugins.perception.network import PerceptionNet  # noqa: E402
 from hecbench_plugins.perception.skeleton import keypoint_positions, keypoints_of  # noqa: E402
 from hecbench_plugins.regression.kinematics import Kinematics  # noqa: E402
 from hecbench_plugins.regression.losses import losses  # noqa: E402
+from hecbench_plugins.regression.network import Dense, grid_of, places_of  # noqa: E402
 from hecbench_plugins.regression.onnx_export import to_onnx  # noqa: E402
 from hecbench_plugins.regression.plan import Plan  # noqa: E402
 from hecbench_plugins.regression.product import write_model  # noqa: E402
+from hecbench_plugins.regression.sketches import Sketches, fit_dense  # noqa: E402
 from hecbench_plugins.regression.training import Training  # noqa: E402
 from hecbench_plugins.solvers.regression import regression  # noqa: E402
 
@@ -31,7 +35,7 @@ K = np.array([[300.0, 0, 159.5], [0, 300, 119.5], [0, 0, 1]])
 
 
 def plan(out, robot, **changes):
-    settings = {"hours": 1.0, "steps": 4, "size": 64, "batch": 4, "capacity": 6, **changes}
+    settings = {"hours": 1.0, "steps": 4, "size": 64, "batch": 4, "capacity": 6, "sketches": 3, **changes}
     return Plan((str(robot),), out, **settings)
 
 
@@ -95,17 +99,38 @@ def test_the_truth_of_every_picture_costs_nothing(run):
     assert losses(right + 0.1, *batch[2:]).total() > 0.1
 
 
-def test_the_encoder_of_a_perception_model_answers_as_it_does_there(tmp_path):
+def test_the_sight_of_a_perception_model_is_as_it_was_there(tmp_path):
     training = Training(plan(tmp_path, "ur5e", start_from=WEIGHTS), silent)
     batch = training.shots.batch(training._rng())
     graph = cv2.dnn.readNetFromONNX(str(WEIGHTS / "perception.onnx"))
-    graph.setInput(batch.pictures[:1].numpy())
-    layer = next(name for name in graph.getLayerNames() if "/down.3/down.3.1/Relu" in name)
-    expected = graph.forward(layer)
-    x = training.net.look(batch.pictures)
-    for block in training.net.down:
-        x = block(x)
-    np.testing.assert_allclose(x[:1].detach(), expected, atol=0.02 * np.abs(expected).max())
+    expected = []
+    for picture in batch.pictures:
+        graph.setInput(picture[None].numpy())
+        expected.append(graph.forward()[0].copy())
+    found = PerceptionNet.forward(training.net, batch.pictures).detach()
+    np.testing.assert_allclose(found, expected, atol=0.02 * np.abs(expected).max())
+
+
+def test_places_of_heatmaps():
+    heat = torch.full((1, 2, 64, 64), -50.0)
+    heat[0, 0, 16, 48] = 0.0
+    heat[0, 1] = 0.0
+    across, down, spread = places_of(heat, grid_of(64)).view(3, 2)
+    np.testing.assert_allclose(across, [48.5 / 64 - 0.5, 0], atol=1e-5)
+    np.testing.assert_allclose(down, [16.5 / 64 - 0.5, 0], atol=1e-5)
+    np.testing.assert_allclose(spread, [0, (1 / 6) ** 0.5], atol=2e-3)
+
+
+def test_dense_layers_learn_from_sketches(crane):
+    torch.manual_seed(0)
+    arm = Family.of([str(crane)]).arms[0]
+    sketches, dense, lines = Sketches(arm, np.random.default_rng(0)), Dense(5, 2), []
+    sketch = sketches.batch(64)
+    assert len(sketch.places) > 32
+    before = losses(dense(sketch.places, sketch.postures), *sketch[2:]).total()
+    fit_dense(dense, sketches, 40, lines.append)
+    assert losses(dense(sketch.places, sketch.postures), *sketch[2:]).total() < 0.8 * before
+    assert lines[-1].startswith("sketches, step 40 of 40")
 
 
 def test_the_graph_answers_as_the_network_does(run):
