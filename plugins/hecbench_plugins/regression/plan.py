@@ -42,3 +42,5 @@ class Plan(plan.Plan):
         super().check()
         if len(self.robots) != 1:
             raise InputError(f"--robot: this network is for one robot, {len(self.robots)} are given")
+        if self.sketches < 0:
+            raise InputError(f"--sketches must be 0 or more, is {self.sketches}")

@@ -23,7 +23,7 @@ from hecbench_plugins.regression.plan import CROP_PX
 from hecbench_plugins.regression.reference import posture, reference_link
 from hecbench_plugins.regression.training import Training
 
-_ROWS, _COLUMNS = 3, 6
+_ROWS, _COLUMNS = 2, 6
 _TRUE, _ANSWERED = (0, 255, 0), (255, 0, 0)
 
 

@@ -12,9 +12,11 @@ pytest.importorskip("pytorch_kinematics")
 
 import cv2  # noqa: E402
 from hecbench_plugins.networks.ur import WEIGHTS  # noqa: E402
+from hecbench_plugins.perception import commands  # noqa: E402
 from hecbench_plugins.perception.family import Family  # noqa: E402
 from hecbench_plugins.perception.network import PerceptionNet  # noqa: E402
 from hecbench_plugins.perception.skeleton import keypoint_positions, keypoints_of  # noqa: E402
+from hecbench_plugins.regression import training  # noqa: E402
 from hecbench_plugins.regression.kinematics import Kinematics  # noqa: E402
 from hecbench_plugins.regression.losses import losses  # noqa: E402
 from hecbench_plugins.regression.network import Dense, grid_of, places_of  # noqa: E402
@@ -25,11 +27,12 @@ from hecbench_plugins.regression.sketches import Sketches, fit_dense  # noqa: E4
 from hecbench_plugins.regression.training import Training  # noqa: E402
 from hecbench_plugins.solvers.regression import regression  # noqa: E402
 
-from hecbench import se3  # noqa: E402
+from hecbench import registry, se3  # noqa: E402
 from hecbench.errors import InputError, Refusal, SolverFailure  # noqa: E402
 from hecbench.lens import CameraModel  # noqa: E402
 from hecbench.recording import Mounting, Recording, RobotDescription  # noqa: E402
 from hecbench.robots.model import load_robot  # noqa: E402
+from hecbench.specs import Kind, SolverSpec  # noqa: E402
 
 K = np.array([[300.0, 0, 159.5], [0, 300, 119.5], [0, 0, 1]])
 
@@ -45,9 +48,9 @@ def silent(line):
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory, crane):
-    training = Training(plan(tmp_path_factory.mktemp("run"), crane), silent)
-    training.run()
-    return training
+    begun = Training(plan(tmp_path_factory.mktemp("run"), crane), silent)
+    begun.run()
+    return begun
 
 
 @pytest.fixture(scope="module")
@@ -100,14 +103,14 @@ def test_the_truth_of_every_picture_costs_nothing(run):
 
 
 def test_the_sight_of_a_perception_model_is_as_it_was_there(tmp_path):
-    training = Training(plan(tmp_path, "ur5e", start_from=WEIGHTS), silent)
-    batch = training.shots.batch(training._rng())
+    begun = Training(plan(tmp_path, "ur5e", start_from=WEIGHTS), silent)
+    batch = begun.shots.batch(begun._rng())
     graph = cv2.dnn.readNetFromONNX(str(WEIGHTS / "perception.onnx"))
     expected = []
     for picture in batch.pictures:
         graph.setInput(picture[None].numpy())
         expected.append(graph.forward()[0].copy())
-    found = PerceptionNet.forward(training.net, batch.pictures).detach()
+    found = PerceptionNet.forward(begun.net, batch.pictures).detach()
     np.testing.assert_allclose(found, expected, atol=0.02 * np.abs(expected).max())
 
 
@@ -195,3 +198,32 @@ def test_what_cannot_be_answered_is_said_in_one_line(folder, crane, tmp_path):
 def test_a_run_for_two_robots_is_refused(tmp_path):
     with pytest.raises(InputError, match="--robot: this network is for one robot"):
         Plan(("ur5e", "ur3e"), tmp_path, 1.0).check()
+
+
+def test_it_trains_and_solves_from_the_command_line(crane, tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(training, "_FIRST_PICTURES", 4)
+    options = {"--robot": crane, "--out": tmp_path, "--steps": 2, "--batch": 2, "--sketches": 1}
+    commands.train.main(
+        ["regression", *(str(word) for pair in options.items() for word in pair)], standalone_mode=False
+    )
+    assert f"{tmp_path / 'model'}: the model" in capsys.readouterr().out
+    spec = registry.load().get(Kind.SOLVER, "regression", SolverSpec)
+    solver = spec.configured({"model": str(tmp_path / "model")}).factory()
+    assert solver(photographed(crane), rng=np.random.default_rng(0)).diagnostics["views"] == 2
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (["--hours", "0"], "--hours must be positive"),
+        (["--sketches", "-1"], "--sketches must be 0"),
+        (["--start-from", "absent.safetensors"], "does not exist"),
+        (["--start-from", "."], r"model\.json"),
+    ],
+)
+def test_bad_options_are_one_line(options, message, crane, tmp_path, monkeypatch):
+    monkeypatch.setattr(training, "_FIRST_PICTURES", 4)
+    words = ["regression", "--robot", str(crane), "--out", str(tmp_path), *options]
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(InputError, match=message):
+        commands.train.main(words, standalone_mode=False)
