@@ -15,6 +15,8 @@ _MAD = 1.4826
 """Of a normal distribution: its deviation over its median absolute deviation."""
 _MEDIAN_VARIANCE = np.pi / 2
 """Of a median of n normal numbers, over that of their mean."""
+SHARED_VARIANCE = 2.5
+"""Of the error that all views of a camera share, over the spread of one view."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +51,7 @@ def combined(parent_T_camera: ArrayLike) -> Combined:
         return Combined(found, None, 0.0, 0.0)
     of_twist = np.eye(6)
     of_twist[3:, :3] = se3.hat(place)  # a turn about the parent's origin moves the camera, too
-    variance = np.repeat([spread_rad**2, spread_m**2], 3) * _MEDIAN_VARIANCE / n
+    variance = np.repeat([spread_rad**2, spread_m**2], 3) * (_MEDIAN_VARIANCE / n + SHARED_VARIANCE)
     return Combined(found, of_twist * variance @ of_twist.T, spread_m, spread_rad)
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from hecbench_plugins.regression.answer import columns, decode
-from hecbench_plugins.regression.combining import combined, l1_mean
+from hecbench_plugins.regression.combining import SHARED_VARIANCE, combined, l1_mean
 from hecbench_plugins.regression.reference import posture, reference_link
 from hecbench_plugins.regression.virtual_camera import VirtualCamera, towards
 from hypothesis import given
@@ -129,10 +129,12 @@ def test_the_order_of_views_and_the_frame_do_not_matter():
     np.testing.assert_allclose(l1_mean(turn @ poses[:, :3, :3]), turn @ l1_mean(poses[:, :3, :3]), atol=1e-7)
 
 
-def test_the_covariance_is_that_of_independent_views():
-    normalised = []
+def test_the_covariance_is_that_of_views_that_share_an_error():
+    normalised, share = [], SHARED_VARIANCE**0.5
     for seed in range(80):
-        found = combined(spread(TRUTH, 20, np.random.default_rng(seed)))
+        rng = np.random.default_rng(seed)
+        shared = spread(TRUTH, 1, rng, 0.02 * share, 0.03 * share)[0]
+        found = combined(spread(shared, 20, rng))
         error = se3.log(TRUTH @ se3.inverse(found.parent_T_camera))
         normalised.append(error @ np.linalg.solve(found.covariance, error))
     assert 4 < np.median(normalised) < 8  # chi-square of 6: 5.3
