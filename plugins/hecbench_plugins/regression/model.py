@@ -39,15 +39,17 @@ class RegressionModel:
         except cv2.error as error:
             reason = " ".join(str(error).split())[-160:]
             raise InputError(f"{path}: OpenCV cannot run this graph: {reason}") from None
-        if answer.shape != (NUMBERS,):
+        if answer.shape != (NUMBERS + 1,):
             raise InputError(
-                f"{path}: the graph answers {answer.shape}, {NUMBERS} numbers are wanted: train the model again"
+                f"{path}: the graph answers {answer.shape}, {NUMBERS + 1} numbers are wanted: train the model again"
             )
 
     def camera_T_reference(
         self, image: NDArray[np.uint8], camera: CameraModel, joints_rad: ArrayLike, points: Array
-    ) -> Array:
-        """The pose (4, 4) m of the card's link that one picture shows.
+    ) -> tuple[Array, float]:
+        """The pose (4, 4) m of the card's link that one picture shows, and the blur of the whole picture.
+
+        The blur is the mean spread of the keypoints' heatmaps as a share of the side: 0.41 for even ones.
 
         Args:
             image: (H, W, 3) RGB as the camera took it, with its distortion.
@@ -55,11 +57,11 @@ class RegressionModel:
             joints_rad: (J,) in the card's order.
             points: (K, 3) m, the card's keypoints in the link's frame at these joints.
         """
-        found = self._look(VirtualCamera.whole(camera), image, camera, joints_rad, points)
+        found, blur = self._look(VirtualCamera.whole(camera), image, camera, joints_rad, points)
         for share in _SHARES:
             view = VirtualCamera.at(se3.transform_points(found, points), share)
-            found = self._look(view, image, camera, joints_rad, points)
-        return found
+            found, _ = self._look(view, image, camera, joints_rad, points)
+        return found, blur
 
     def _look(
         self,
@@ -68,14 +70,15 @@ class RegressionModel:
         camera: CameraModel,
         joints_rad: ArrayLike,
         points: Array,
-    ) -> Array:
+    ) -> tuple[Array, float]:
         numbers = self._answer(view.picture(image, camera, self.card.size), joints_rad)
-        pose = decode(numbers, view.focal)
+        pose = decode(numbers[:NUMBERS], view.focal)
         R = view.camera_R_crop @ np.stack([pose.x, pose.y, pose.z], -1)
-        return se3.make(R, view.camera_R_crop @ np.array(pose.middle) - R @ points.mean(0))
+        t = view.camera_R_crop @ np.array(pose.middle) - R @ points.mean(0)
+        return se3.make(R, t), float(numbers[-1])
 
     def _answer(self, picture: NDArray[np.uint8], joints_rad: ArrayLike) -> NDArray[np.float64]:
-        """The nine numbers for a picture (S, S, 3)."""
+        """The graph's numbers for a picture (S, S, 3)."""
         blob = np.ascontiguousarray(picture.transpose(2, 0, 1)[None], np.float32) / 255
         self._net.setInput(blob, "image")
         self._net.setInput(posture(joints_rad)[None].astype(np.float32), "posture")

@@ -33,7 +33,7 @@ class Dense(nn.Module):
 
 
 class RegressionNet(PerceptionNet):
-    """Pictures (B, 3, S, S) RGB in [0, 1] and postures (B, P) to numbers (B, 9).
+    """Pictures (B, 3, S, S) RGB in [0, 1] and postures (B, P) to numbers (B, 10): those of `answer`, and the blur.
 
     The convolutions are those of the perception network, whose weights may be their start. Between them and the
     dense layers each heatmap becomes its mean place and its spread (spatial softmax, Levine et al. 2016).
@@ -45,9 +45,10 @@ class RegressionNet(PerceptionNet):
         self.register_buffer("grid", grid_of(CROP_PX // 2), persistent=False)
 
     def forward(self, x: Tensor, posture: Tensor) -> Tensor:  # type: ignore[override]
-        """The nine numbers."""
-        out: Tensor = self.dense(self.places(x), posture)
-        return out
+        """Nine numbers for the pose, and the mean spread of the heatmaps, a share of the side."""
+        places = self.places(x)
+        blur = places[:, 2 * self.keypoints :].mean(1, keepdim=True)
+        return torch.cat([self.dense(places, posture), blur], 1)
 
     def places(self, x: Tensor) -> Tensor:
         """(B, 3 K), as `places_of` has them, in pictures."""

@@ -63,7 +63,7 @@ def _samples(model: RegressionModel, maker: PictureMaker) -> NDArray[np.uint8]:
         root_T_reference = root_T_link[arm.model.link_index(model.card.reference)]
         points = arm.keypoint_positions(se3.inverse(root_T_reference) @ root_T_link)
         camera = CameraModel(maker.size, maker.size, truth.K)
-        answer = model.camera_T_reference(example.image, camera, truth.joints_rad, points)
+        answer, _ = model.camera_T_reference(example.image, camera, truth.joints_rad, points)
         tile = np.ascontiguousarray(example.image)
         for pose, colour in ((truth.camera_T_root @ root_T_reference, _TRUE), (answer, _ANSWERED)):
             p = se3.transform_points(pose, points)

@@ -33,7 +33,8 @@ class Regression:
 
         Raises:
             Refusal: the camera is on the flange, or no picture has joints.
-            SolverFailure: there are no weights, they are of another robot, or the views contradict each other.
+            SolverFailure: there are no weights, they are of another robot, no picture shows a robot, or the views
+                contradict each other.
         """
         from hecbench_plugins.regression.combining import combined
 
@@ -60,7 +61,7 @@ class Regression:
         )
 
     def _views(self, recording: Recording) -> Array:
-        """parent_T_camera (N, 4, 4) by each picture whose joints are known."""
+        """parent_T_camera (N, 4, 4) by each picture that shows the robot and whose joints are known."""
         from hecbench.robots.posed import PosedRobot
         from hecbench_plugins.perception.choice import robot_of
         from hecbench_plugins.perception.skeleton import keypoint_positions
@@ -76,10 +77,10 @@ class Regression:
             posed = PosedRobot.of(recording, meshes=False)
             order = [posed.joint_names.index(name) for name in network.card.joints]
             parent_T_links = posed.link_poses(posed.joints_rad[posed.samples])
+            reference = posed.model.link_index(network.card.reference)
         except (InputError, ValueError) as error:
             raise Refusal(f"{recording.name}: the robot cannot be posed: {error}") from error
-        reference = posed.model.link_index(network.card.reference)
-        found = []
+        found, images_seen = [], 0
         for sample, poses in zip(posed.samples.tolist(), parent_T_links, strict=True):
             if images[sample] is None:
                 continue
@@ -88,10 +89,15 @@ class Regression:
                 posed.model.links, network.card.keypoints, se3.inverse(parent_T_reference) @ poses
             )
             joints = posed.joints_rad[sample, order]
-            camera_T_reference = network.camera_T_reference(recording.image(sample), camera, joints, points)
-            found.append(parent_T_reference @ se3.inverse(camera_T_reference))
-        if not found:
+            image = recording.image(sample)
+            camera_T_reference, blur = network.camera_T_reference(image, camera, joints, points)
+            images_seen += 1
+            if blur < self.settings.largest_blur:
+                found.append(parent_T_reference @ se3.inverse(camera_T_reference))
+        if not images_seen:
             raise Refusal(f"{recording.name}: no image has joints: give samples[].joints_rad")
+        if not found:
+            raise SolverFailure(f"no robot is seen in any of the {images_seen} images")
         return np.array(found)
 
 

@@ -1,7 +1,9 @@
 """Training at a toy's size: its parts are right, a stop changes nothing, and a solver runs what it leaves."""
 
+import hashlib
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -13,19 +15,22 @@ pytest.importorskip("pytorch_kinematics")
 import cv2  # noqa: E402
 from hecbench_plugins.networks.ur import WEIGHTS  # noqa: E402
 from hecbench_plugins.perception import commands  # noqa: E402
+from hecbench_plugins.perception.card import read_network, write_card  # noqa: E402
 from hecbench_plugins.perception.family import Family  # noqa: E402
 from hecbench_plugins.perception.network import PerceptionNet  # noqa: E402
 from hecbench_plugins.perception.skeleton import keypoint_positions, keypoints_of  # noqa: E402
 from hecbench_plugins.regression import training  # noqa: E402
+from hecbench_plugins.regression.card import RegressionCard  # noqa: E402
 from hecbench_plugins.regression.kinematics import Kinematics  # noqa: E402
 from hecbench_plugins.regression.losses import losses  # noqa: E402
 from hecbench_plugins.regression.network import Dense, grid_of, places_of  # noqa: E402
 from hecbench_plugins.regression.onnx_export import to_onnx  # noqa: E402
 from hecbench_plugins.regression.plan import Plan  # noqa: E402
 from hecbench_plugins.regression.product import write_model  # noqa: E402
+from hecbench_plugins.regression.settings import Settings  # noqa: E402
 from hecbench_plugins.regression.sketches import Sketches, fit_dense  # noqa: E402
 from hecbench_plugins.regression.training import Training  # noqa: E402
-from hecbench_plugins.solvers.regression import regression  # noqa: E402
+from hecbench_plugins.solvers.regression import Regression  # noqa: E402
 
 from hecbench import registry, se3  # noqa: E402
 from hecbench.errors import InputError, Refusal, SolverFailure  # noqa: E402
@@ -160,7 +165,8 @@ def photographed(robot, **changes):
 
 
 def solved(recording, model):
-    return regression(model)(recording, rng=np.random.default_rng(0))
+    settings = Settings(model, largest_blur=1.0, largest_spread_rad=4.0)
+    return Regression(settings)(recording, rng=np.random.default_rng(0))
 
 
 def test_a_solver_answers_by_the_folder(folder, crane, monkeypatch):
@@ -195,6 +201,15 @@ def test_what_cannot_be_answered_is_said_in_one_line(folder, crane, tmp_path):
         solved(recording, tmp_path)
 
 
+def test_a_graph_that_opencv_cannot_run_is_one_line(folder, crane, tmp_path):
+    card, _ = read_network(folder, RegressionCard)
+    (tmp_path / "regression.onnx").write_bytes(b"nonsense")
+    write_card(tmp_path, msgspec.structs.replace(card, sha256=hashlib.sha256(b"nonsense").hexdigest()))
+    with pytest.raises(SolverFailure, match="OpenCV cannot run this graph") as failure:
+        solved(photographed(crane), tmp_path)
+    assert "\n" not in str(failure.value)
+
+
 def test_a_run_for_two_robots_is_refused(tmp_path):
     with pytest.raises(InputError, match="--robot: this network is for one robot"):
         Plan(("ur5e", "ur3e"), tmp_path, 1.0).check()
@@ -209,7 +224,8 @@ def test_it_trains_and_solves_from_the_command_line(crane, tmp_path, monkeypatch
     assert f"{tmp_path / 'model'}: the model" in capsys.readouterr().out
     spec = registry.load().get(Kind.SOLVER, "regression", SolverSpec)
     solver = spec.configured({"model": str(tmp_path / "model")}).factory()
-    assert solver(photographed(crane), rng=np.random.default_rng(0)).diagnostics["views"] == 2
+    with pytest.raises(SolverFailure, match="no robot is seen in any of the 2 images"):
+        solver(photographed(crane), rng=np.random.default_rng(0))
 
 
 @pytest.mark.parametrize(
