@@ -40,6 +40,6 @@ WORDS = Words(
         " is a rough place, not a calibration.",
         "A camera on the flange, which does not see the whole arm, was not trained.",
         "All views of one camera are wrong in similar ways, so that more of them help little.",
-        "It answers whatever it sees, also when there is no robot; only the spread of the views says so.",
+        "Crowded pictures without a robot are often answered; only the spread of the views says so.",
     ),
 )

@@ -15,8 +15,9 @@ _MAD = 1.4826
 """Of a normal distribution: its deviation over its median absolute deviation."""
 _MEDIAN_VARIANCE = np.pi / 2
 """Of a median of n normal numbers, over that of their mean."""
-SHARED_VARIANCE = 2.5
-"""Of the error that all views of a camera share, over the spread of one view."""
+SHARED_VARIANCE = 1.0
+"""Of the error that all views of a camera share, over the variance of one view. Measured on six recordings of the
+virtual lab, of a seed that no figure is of: about 0.6 for rotations, 1.4 for places."""
 
 
 @dataclass(frozen=True, eq=False)

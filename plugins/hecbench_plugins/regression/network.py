@@ -42,7 +42,7 @@ class RegressionNet(PerceptionNet):
     def __init__(self, classes: int, keypoints: int, posture: int) -> None:
         super().__init__(classes, keypoints)
         self.dense = Dense(keypoints, posture)
-        self.register_buffer("grid", grid_of(CROP_PX // 2), persistent=False)
+        self.register_buffer("axis", axis_of(CROP_PX // 2), persistent=False)
 
     def forward(self, x: Tensor, posture: Tensor) -> Tensor:  # type: ignore[override]
         """Nine numbers for the pose, and the mean spread of the heatmaps, a share of the side."""
@@ -52,20 +52,20 @@ class RegressionNet(PerceptionNet):
 
     def places(self, x: Tensor) -> Tensor:
         """(B, 3 K), as `places_of` has them, in pictures."""
-        assert isinstance(self.grid, Tensor)
-        return places_of(super().forward(x)[:, self.classes + 1 :].float(), self.grid)
+        assert isinstance(self.axis, Tensor)
+        return places_of(super().forward(x)[:, self.classes + 1 :].float(), self.axis)
 
 
-def grid_of(cells: int) -> Tensor:
-    """(S * S, 3): each cell's place across and down from the middle, shares of the side, and its square from there."""
-    axis = (torch.arange(cells) + 0.5) / cells - 0.5
-    down, across = torch.meshgrid(axis, axis, indexing="ij")
-    return torch.stack([across, down, across**2 + down**2], -1).flatten(0, 1)
+def axis_of(cells: int) -> Tensor:
+    """(S, 2): each cell's place from the middle, as a share of the side, and its square."""
+    place = (torch.arange(cells) + 0.5) / cells - 0.5
+    return torch.stack([place, place**2], 1)
 
 
-def places_of(heat: Tensor, grid: Tensor) -> Tensor:
+def places_of(heat: Tensor, axis: Tensor) -> Tensor:
     """(B, 3 K): across and down from the middle, then the spread, shares of the side, of heatmaps (B, K, S, S)."""
-    moments = heat.flatten(2).softmax(2) @ grid
-    across, down = moments[..., 0], moments[..., 1]
-    variance = (moments[..., 2] - across * across - down * down).clamp(min=_LEAST_VARIANCE)
-    return torch.cat([across, down, variance.sqrt()], 1)
+    share = heat.flatten(2).softmax(2).view(heat.shape)
+    across, down = share.sum(2) @ axis, share.sum(3) @ axis
+    x, y = across[..., 0], down[..., 0]
+    variance = (across[..., 1] + down[..., 1] - x * x - y * y).clamp(min=_LEAST_VARIANCE)
+    return torch.cat([x, y, variance.sqrt()], 1)

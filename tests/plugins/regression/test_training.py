@@ -23,7 +23,7 @@ from hecbench_plugins.regression import training  # noqa: E402
 from hecbench_plugins.regression.card import RegressionCard  # noqa: E402
 from hecbench_plugins.regression.kinematics import Kinematics  # noqa: E402
 from hecbench_plugins.regression.losses import losses  # noqa: E402
-from hecbench_plugins.regression.network import Dense, grid_of, places_of  # noqa: E402
+from hecbench_plugins.regression.network import Dense, axis_of, places_of  # noqa: E402
 from hecbench_plugins.regression.onnx_export import to_onnx  # noqa: E402
 from hecbench_plugins.regression.plan import Plan  # noqa: E402
 from hecbench_plugins.regression.product import write_model  # noqa: E402
@@ -123,7 +123,7 @@ def test_places_of_heatmaps():
     heat = torch.full((1, 2, 64, 64), -50.0)
     heat[0, 0, 16, 48] = 0.0
     heat[0, 1] = 0.0
-    across, down, spread = places_of(heat, grid_of(64)).view(3, 2)
+    across, down, spread = places_of(heat, axis_of(64)).view(3, 2)
     np.testing.assert_allclose(across, [48.5 / 64 - 0.5, 0], atol=1e-5)
     np.testing.assert_allclose(down, [16.5 / 64 - 0.5, 0], atol=1e-5)
     np.testing.assert_allclose(spread, [0, (1 / 6) ** 0.5], atol=2e-3)
