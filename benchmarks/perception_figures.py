@@ -141,6 +141,10 @@ def camera_summary(rows):
     found["right_interval"] = [round(rate.low, 3), round(rate.high, 3)]
     if answered:
         found["median_mm"], found["median_deg"] = np.round(np.median(answered, 0), 2).tolist()
+        for place, name in enumerate(("mm", "deg")):
+            interval = bootstrap([row[place] for row in answered], np.median)
+            if np.isfinite(interval.low):
+                found[f"median_{name}_interval"] = [round(interval.low, 2), round(interval.high, 2)]
         found["worst_mm"], found["worst_deg"] = np.round(np.max(answered, 0), 2).tolist()
     return found
 

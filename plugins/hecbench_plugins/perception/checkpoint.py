@@ -28,7 +28,7 @@ class Progress:
     averaged: int = 0
     curve: list[list[float]] = field(default_factory=list)
     history: list[str] = field(default_factory=list)
-    """One line for each start of the run: its settings."""
+    """Its settings, one line whenever they changed."""
 
 
 def write(path: Path, net: nn.Module, average: dict[str, Tensor], optimiser: Any, progress: Progress) -> None:

@@ -56,7 +56,7 @@ def facts(training: Run) -> dict[str, Any]:
     return {
         "command": shlex.join(["hecbench", *sys.argv[1:]]),
         "date": datetime.now(UTC).date().isoformat(),
-        "settings": progress.history,
+        "settings": list(dict.fromkeys(progress.history)),
         "seed": progress.seed,
         "hours": round(progress.seconds / 3600, 2),
         "steps": progress.step,

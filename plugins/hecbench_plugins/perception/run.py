@@ -63,7 +63,8 @@ class Run(ABC):
             for name in self.average:
                 self.average[name] = tensors[f"average/{name}"].to(self.device)
             checkpoint.load_moments(self.optimiser, self.net, tensors)
-        self.progress.history.append(str(plan))
+        if self.progress.history[-1:] != [str(plan)]:
+            self.progress.history.append(str(plan))
 
     @abstractmethod
     def network(self) -> nn.Module:
