@@ -36,8 +36,7 @@ WORDS = Words(
     "Answers the pose of a standing camera from one picture and the robot's joints (after Valassakis et al. 2021)."
     " Used by the solver `regression`.",
     (
-        "It was trained on drawn pictures of the arm alone, a few thousand of them, and for a short time: what it says"
-        " is a rough place, not a calibration.",
+        "It was trained on drawn pictures of the arm alone. What it says is a rough place, not a calibration.",
         "A camera on the flange, which does not see the whole arm, was not trained.",
         "All views of one camera are wrong in similar ways, so that more of them help little.",
         "Crowded pictures without a robot are often answered; only the spread of the views says so.",
