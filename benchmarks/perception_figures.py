@@ -1,7 +1,8 @@
 """Masks and cameras by the network, on recordings that it was not trained on.
 
 Run: ``python benchmarks/perception_figures.py masks|cameras RECORDING... --name NAME --out FILE.json``. The recordings
-need joints, a robot model, intrinsics, images and a true camera. A run replaces the figures of its name in FILE.
+need joints, a robot model, intrinsics, images and a true camera; ``--lab SEED`` draws the virtual lab's 18 instead. A
+run replaces the figures of its name in FILE.
 """
 
 from __future__ import annotations
@@ -16,8 +17,9 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
-from hecbench_plugins.perception.card import read_card, write_card
-from hecbench_plugins.perception.card_text import write_page
+from hecbench_plugins.perception.card import ModelCard, read_network, write_card
+from hecbench_plugins.perception.card_text import PERCEPTION, write_page
+from hecbench_plugins.regression.card import WORDS, RegressionCard
 
 from hecbench import registry, se3
 from hecbench.estimate import Status
@@ -30,6 +32,17 @@ RIGHT_M, RIGHT_DEG = 0.03, 2.0
 """A camera nearer than this to the truth is right."""
 HELD_MARGIN = 0.22
 """Of the board's extent, around board and flange: what a robot holds is not in its model."""
+
+
+WITHOUT_MASKS = ("keypoints", "regression")
+"""Solvers that need neither masks nor a start."""
+
+
+def laboratory(seed):
+    """The virtual lab's 18 cells as `hecbench run lab --level photographs` draws them, 10 views each."""
+    from hecbench_hardware.lab.recordings import photograph_recording
+
+    return [photograph_recording(calibration, seed) for calibration in range(18)]
 
 
 def truth_masks(recording):
@@ -128,6 +141,10 @@ def camera_summary(rows):
     found["right_interval"] = [round(rate.low, 3), round(rate.high, 3)]
     if answered:
         found["median_mm"], found["median_deg"] = np.round(np.median(answered, 0), 2).tolist()
+        for place, name in enumerate(("mm", "deg")):
+            interval = bootstrap([row[place] for row in answered], np.median)
+            if np.isfinite(interval.low):
+                found[f"median_{name}_interval"] = [round(interval.low, 2), round(interval.high, 2)]
         found["worst_mm"], found["worst_deg"] = np.round(np.max(answered, 0), 2).tolist()
     return found
 
@@ -135,7 +152,8 @@ def camera_summary(rows):
 def main():
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("what", choices=("masks", "cameras"))
-    options.add_argument("recordings", nargs="+", type=Path)
+    options.add_argument("recordings", nargs="*", type=Path)
+    options.add_argument("--lab", type=int, metavar="SEED", help="photographs of the virtual lab")
     options.add_argument("--out", type=Path, required=True)
     options.add_argument("--name", required=True, help="of the group of recordings")
     options.add_argument("--segmenter", default="learned")
@@ -146,7 +164,7 @@ def main():
     options.add_argument("--seed", type=int, default=0)
     options.add_argument("--card", type=Path, help="folder of the network, whose card gets the figures, too")
     o = options.parse_args()
-    recordings = [load_recording(path) for path in o.recordings]
+    recordings = [load_recording(path) for path in o.recordings] or laboratory(o.lab)
     if o.what == "masks":
         name = f"masks, {o.name}, {o.segmenter}"
         each = [masks(recording, o.segmenter) for recording in recordings]
@@ -159,7 +177,7 @@ def main():
             float(np.median([one.get("seconds", np.nan) for one in each])), 3
         )
     else:
-        if o.solver.startswith("keypoints"):
+        if o.solver.startswith(WITHOUT_MASKS):
             o.segmenter = None
         given = f", masks {o.segmenter}, start {o.start[0]} m {o.start[1]} deg" if o.segmenter else ""
         name = f"cameras, {o.name}, {o.solver}, {o.views} views{given}"
@@ -178,10 +196,13 @@ def main():
     o.out.write_text(json.dumps(known | {name: figures}, indent=1) + "\n")
     print(name, json.dumps(figures, indent=1))
     if o.card:
-        card, _ = read_card(o.card)
+        kind, words = (
+            (RegressionCard, WORDS) if o.solver.startswith("regression") else (ModelCard, PERCEPTION)
+        )
+        card, _ = read_network(o.card, kind)
         card = msgspec.structs.replace(card, figures=card.figures | {name: figures})
         write_card(o.card, card)
-        write_page(o.card, card)
+        write_page(o.card, card, words)
 
 
 if __name__ == "__main__":

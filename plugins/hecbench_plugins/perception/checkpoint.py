@@ -28,7 +28,7 @@ class Progress:
     averaged: int = 0
     curve: list[list[float]] = field(default_factory=list)
     history: list[str] = field(default_factory=list)
-    """One line for each start of the run: its settings."""
+    """Its settings, one line whenever they changed."""
 
 
 def write(path: Path, net: nn.Module, average: dict[str, Tensor], optimiser: Any, progress: Progress) -> None:
@@ -78,7 +78,7 @@ def load_weights(net: nn.Module, tensors: dict[str, Tensor], prefix: str, path: 
 
 
 def load_moments(optimiser: Any, net: nn.Module, tensors: dict[str, Tensor]) -> None:
-    """Put the optimiser's moments back."""
+    """Put the optimiser's moments back, laid out in memory as the weights are: the fused step assumes that."""
     for name, weight in net.named_parameters():
         moments = {
             moment: tensors[f"{moment}/{name}"]
@@ -87,7 +87,7 @@ def load_moments(optimiser: Any, net: nn.Module, tensors: dict[str, Tensor]) -> 
         }
         if moments:
             optimiser.state[weight] = {
-                k: v if k == "step" else v.to(weight.device) for k, v in moments.items()
+                k: v if k == "step" else torch.empty_like(weight).copy_(v) for k, v in moments.items()
             }
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib.util import find_spec
 from pathlib import Path
@@ -13,13 +13,38 @@ from hecbench.errors import HecbenchError, InputError
 from hecbench_plugins.translation.plan import Method
 
 _FOLDER = click.Path(path_type=Path, file_okay=False)
+_Decorator = Callable[[Callable[..., None]], Callable[..., None]]
 _NEEDED = ("torch", "safetensors", "onnx")
 
 
-def _require_torch() -> None:
-    missing = [name for name in _NEEDED if find_spec(name) is None]
+def _require_torch(*others: str) -> None:
+    missing = [name for name in (*_NEEDED, *others) if find_spec(name) is None]
     if missing:
         raise InputError(f"training needs {' and '.join(missing)}: pip install 'hecbench[torch]'")
+
+
+def _all(*options: _Decorator) -> _Decorator:
+    """One decorator of many, listed in this order."""
+
+    def decorate(command: Callable[..., None]) -> Callable[..., None]:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return decorate
+
+
+_run = _all(
+    click.option("--out", required=True, type=_FOLDER, help="Folder of the run; a run found there goes on."),
+    click.option("--seed", default=0, show_default=True),
+    click.option("--threads", default=1, show_default=True, help="Of the processor."),
+)
+_drawing = _all(
+    click.option("--steps", type=int, help="End after so many steps, if that is sooner."),
+    click.option(
+        "--backgrounds", type=_FOLDER, help="Folder of photographs without a robot, drawn behind it."
+    ),
+)
 
 
 @click.group()
@@ -31,17 +56,14 @@ def train() -> None:
 @click.option(
     "--robot", "robots", multiple=True, required=True, help="A known robot or a URDF file; repeatable."
 )
-@click.option("--out", required=True, type=_FOLDER, help="Folder of the run; a run found there goes on.")
 @click.option("--hours", default=3.0, show_default=True, help="End after this time.")
-@click.option("--steps", type=int, help="End after so many steps, if that is sooner.")
-@click.option("--seed", default=0, show_default=True)
 @click.option("--size", default=192, show_default=True, help="Side of the drawn pictures, px.")
 @click.option("--batch", default=8, show_default=True, help="Pictures per step.")
-@click.option("--threads", default=1, show_default=True, help="Of the processor.")
 @click.option(
     "--start-from", type=click.Path(path_type=Path, dir_okay=False), help="A checkpoint to start from."
 )
-@click.option("--backgrounds", type=_FOLDER, help="Folder of photographs without a robot, drawn behind it.")
+@_drawing
+@_run
 def perception(
     robots: tuple[str, ...],
     out: Path,
@@ -85,17 +107,74 @@ def perception(
 
 
 @train.command()
+@click.option("--robot", required=True, help="A known robot or a URDF file.")
+@click.option("--hours", default=1.0, show_default=True, help="End after this time.")
+@click.option("--batch", default=16, show_default=True, help="Pictures per step.")
+@click.option(
+    "--sketches",
+    default=7000,
+    show_default=True,
+    help="Steps of the dense layers on keypoints alone, before any picture.",
+)
+@click.option(
+    "--start-from",
+    type=click.Path(path_type=Path),
+    help="A checkpoint, or the folder of a perception model that has learned to see the robot.",
+)
+@_drawing
+@_run
+def regression(
+    robot: str,
+    out: Path,
+    hours: float,
+    steps: int | None,
+    seed: int,
+    batch: int,
+    sketches: int,
+    threads: int,
+    start_from: Path | None,
+    backgrounds: Path | None,
+) -> None:
+    """Train the network that answers the camera's pose from one picture, and write it as OUT/model.
+
+    The run needs no data. It may be stopped at any moment: the same command goes on from its last checkpoint.
+    """
+    _require_torch("pytorch_kinematics")
+    from hecbench_plugins.regression.plan import Plan
+
+    plan = Plan(
+        (robot,),
+        out,
+        hours,
+        steps,
+        seed=seed,
+        batch=batch,
+        sketches=sketches,
+        threads=threads,
+        start_from=start_from,
+        backgrounds=backgrounds,
+    )
+    plan.check()
+    from hecbench_plugins.regression.training import Training
+
+    training = Training(plan, click.echo)
+    with _room_on_disk(out):
+        training.run()
+        from hecbench_plugins.regression.product import write_model
+
+        click.echo(f"{write_model(training)}: the model, its card and its curve")
+
+
+@train.command()
 @click.option("--method", required=True, type=click.Choice([str(method) for method in Method]))
 @click.option(
     "--robot", "robots", multiple=True, required=True, help="A known robot or a URDF file; repeatable."
 )
-@click.option("--out", required=True, type=_FOLDER, help="Folder of the run; a run found there goes on.")
 @click.option(
     "--steps", default=588_000, show_default=True, help="Pictures; the default is 400 epochs of 1470."
 )
 @click.option("--size", default=256, show_default=True, help="Side of the pictures, px; 64 for a processor.")
-@click.option("--seed", default=0, show_default=True)
-@click.option("--threads", default=1, show_default=True, help="Of the processor.")
+@_run
 def translation(
     method: str, robots: tuple[str, ...], out: Path, steps: int, size: int, seed: int, threads: int
 ) -> None:

@@ -15,6 +15,7 @@ from hecbench.se3 import Array
 from hecbench_plugins.perception.card import ModelCard, read_card
 from hecbench_plugins.perception.plan import STRIDE
 from hecbench_plugins.perception.settings import READING
+from hecbench_plugins.perception.shrinking import softened
 from hecbench_plugins.perception.skeleton import keypoint_positions
 
 Floats = NDArray[np.float32]
@@ -159,10 +160,8 @@ class PerceptionModel:
         size = np.maximum(np.ceil(side * scale / STRIDE - 1e-6), 1).astype(int) * STRIDE
         corner = (box[:2] + box[2:]) / 2 - size / scale / 2
         pixel_T_small = np.c_[np.eye(2) / scale, 0.5 / scale + corner - 0.5]
-        if scale < READING.blur_below:
-            image = np.asarray(cv2.GaussianBlur(image, (0, 0), READING.smoothing / scale), np.uint8)
         small = cv2.warpAffine(
-            image,
+            softened(image, scale),
             pixel_T_small,
             (int(size[0]), int(size[1])),
             flags=cv2.INTER_LINEAR | cv2.WARP_INVERSE_MAP,

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench.rendering.normal_map import normal_map
+from hecbench.se3 import Array
 from hecbench_plugins.perception import props
 from hecbench_plugins.perception.appearance import Appearance, photographs
 from hecbench_plugins.perception.camera_faults import photographed
@@ -33,6 +34,21 @@ _ODD_COLOURS = 0.12
 
 
 @dataclass(frozen=True, eq=False)
+class Truth:
+    """The robot and the camera of an example.
+
+    Attributes:
+        joints_rad: (J,) of the model's joints.
+        camera_T_root: (4, 4) m, of the robot's first link.
+        K: (3, 3) px of the picture, pixel centres at integers.
+    """
+
+    joints_rad: Array
+    camera_T_root: Array
+    K: Array
+
+
+@dataclass(frozen=True, eq=False)
 class Example:
     """A picture and what is to be learned from it.
 
@@ -41,22 +57,33 @@ class Example:
         shares: (S/2, S/2, 2 + C): shares of area, of 255, of the background and the C colour classes of the whole
             robot as if nothing hid it, and last of the visible robot.
         keypoints: (K, 2) px of the image, NaN behind the camera.
+        truth: None in a picture without a robot.
     """
 
     image: Bytes
     shares: Bytes
     keypoints: Floats
+    truth: Truth | None = None
 
 
 class PictureMaker:
-    """Draws examples of `size` px; the same seed draws the same sequence."""
+    """Draws examples of `size` px, a share `empty` without a robot; the same seed draws the same sequence."""
 
     def __init__(
-        self, family: Family, size: int, seed: int | tuple[int, ...], backgrounds: Path | None = None
+        self,
+        family: Family,
+        size: int,
+        seed: int | tuple[int, ...],
+        backgrounds: Path | None = None,
+        empty: float = _EMPTY,
     ) -> None:
-        self.family, self.size = family, size
+        self.family, self.size, self.empty = family, size, empty
         self.rng = np.random.default_rng(seed)
         self.appearance = Appearance(self.rng, family.palette[1:], photographs(backgrounds))
+
+    def restart(self, seed: int | tuple[int, ...]) -> None:
+        """Go on with the sequence of another seed."""
+        self.rng.bit_generator.state = np.random.default_rng(seed).bit_generator.state
 
     def example(self) -> Example:
         """The next one."""
@@ -67,7 +94,7 @@ class PictureMaker:
         classes = np.zeros((side, side), np.uint8)
         classes[seen] = arm.part_class[arm.mesh.face_part[scene.renderer.face[seen]]]
         background = self._background(side)
-        if rng.random() < _EMPTY:
+        if rng.random() < self.empty:
             nothing = np.zeros_like(seen)
             nowhere = np.full((self.family.keypoint_count, 2), np.nan, np.float32)
             return self._finished(background, np.zeros_like(classes), nothing, nowhere)
@@ -81,7 +108,8 @@ class PictureMaker:
         self._soil(robot, seen)
         canvas.picture[canvas.visible] = robot[canvas.visible]
         self._furnish(canvas, scene)
-        return self._finished(canvas.picture, classes, canvas.visible, scene.keypoint_pixels())
+        truth = Truth(scene.joints_rad, scene.camera_T_base, scene.K)
+        return self._finished(canvas.picture, classes, canvas.visible, scene.keypoint_pixels(), truth)
 
     def _background(self, side: int) -> Floats:
         rng, appearance = self.rng, self.appearance
@@ -143,11 +171,16 @@ class PictureMaker:
             canvas.visible &= before.covered == 0
 
     def _finished(
-        self, picture: Floats, classes: Bytes, visible: NDArray[np.bool_], points: Floats
+        self,
+        picture: Floats,
+        classes: Bytes,
+        visible: NDArray[np.bool_],
+        points: Floats,
+        truth: Truth | None = None,
     ) -> Example:
         small = cv2.resize(picture, (self.size, self.size), interpolation=cv2.INTER_AREA)
         layers = [classes == c for c in range(len(self.family.palette))] + [visible]
         half = (self.size // 2, self.size // 2)
         shares = [cv2.resize(m.astype(np.float32), half, interpolation=cv2.INTER_AREA) for m in layers]
         image = photographed(np.maximum(small, 0), self.rng)
-        return Example(image, np.rint(np.stack(shares, -1) * 255).astype(np.uint8), points)
+        return Example(image, np.rint(np.stack(shares, -1) * 255).astype(np.uint8), points, truth)

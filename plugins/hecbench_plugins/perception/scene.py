@@ -18,15 +18,17 @@ SUPERSAMPLING = 2
 """Pixels drawn per pixel of the picture, along each axis."""
 
 _TRIES = 50
-_LOWEST_M = 0.03
+LOWEST_M = 0.03
 """No keypoint above the foot may be lower: the floor is in the way."""
-_TAUGHT = 0.3
-"""Share of postures near right angles, as people teach them; within `_TAUGHT_NOISE_RAD` of them."""
-_TAUGHT_NOISE_RAD = 0.15
-_APART_M = 0.1
+TAUGHT = 0.3
+"""Share of postures near right angles, as people teach them; within `TAUGHT_NOISE_RAD` of them."""
+TAUGHT_NOISE_RAD = 0.15
+APART_M = 0.1
 """Keypoints that are not neighbours along the arm may not be nearer: links would pass through each other."""
-_DISTANCE_M = (0.35, 2.6)
+DISTANCE_M = (0.35, 2.6)
 """Of the camera from the robot's nearest reach, on a logarithmic scale."""
+USUAL, USUAL_DEG, ALL_DEG = 0.85, (-15.0, 65.0), (-30.0, 85.0)
+"""Of the camera's elevation: the share of usual ones, their range, and that of the others."""
 _SHARE = (0.3, 1.3)
 """The robot's extent as a share of the picture's side, on a logarithmic scale: beyond 1 it leaves the picture."""
 _MARGIN_M = 0.06
@@ -40,6 +42,8 @@ class Scene:
     """An arm before a camera, drawn `SUPERSAMPLING` times as large as the picture."""
 
     arm: Arm
+    joints_rad: Array
+    """(J,) of the model's joints."""
     base_T_link: Array
     camera_T_base: Array
     K: Array
@@ -75,7 +79,7 @@ def supersampled(K: Array) -> Array:
 
 def random_scene(arm: Arm, size: int, rng: Rng) -> Scene:
     """A posture and a camera that sees at least some of it."""
-    base_T_link = random_posture(arm, rng)
+    joints_rad, base_T_link = random_posture(arm, rng)
     points = arm.keypoint_positions(base_T_link)
     while True:
         camera_T_base, K = random_camera(points, size, rng)
@@ -83,23 +87,23 @@ def random_scene(arm: Arm, size: int, rng: Rng) -> Scene:
         renderer = Renderer(arm.mesh, supersampled(K), side, side)
         renderer.rasterise(camera_T_base @ base_T_link)
         if renderer.dropped == 0 and (renderer.face >= 0).mean() > _LEAST_COVER:
-            return Scene(arm, base_T_link, camera_T_base, K, size, renderer)
+            return Scene(arm, joints_rad, base_T_link, camera_T_base, K, size, renderer)
 
 
-def random_posture(arm: Arm, rng: Rng) -> Array:
-    """root_T_link (L, 4, 4) within the joint limits and above the floor."""
+def random_posture(arm: Arm, rng: Rng) -> tuple[Array, Array]:
+    """Joints (J,) rad within their limits, above the floor, and root_T_link (L, 4, 4)."""
     limits = np.clip(arm.model.limits(), -np.pi, np.pi)
     foot = len({k.link for k in arm.keypoints[:2]}) + 1
     for _ in range(_TRIES):
         q = rng.uniform(limits[:, 0], limits[:, 1])
-        if rng.random() < _TAUGHT:
-            right = np.round(q / (np.pi / 2)) * np.pi / 2 + rng.normal(0, _TAUGHT_NOISE_RAD, len(q))
+        if rng.random() < TAUGHT:
+            right = np.round(q / (np.pi / 2)) * np.pi / 2 + rng.normal(0, TAUGHT_NOISE_RAD, len(q))
             q = np.clip(right, limits[:, 0], limits[:, 1])
         root_T_link = arm.model.link_poses(q)
         points = arm.keypoint_positions(root_T_link)
-        if points[foot:, 2].min(initial=np.inf) > _LOWEST_M and _closest(points) > _APART_M:
+        if points[foot:, 2].min(initial=np.inf) > LOWEST_M and _closest(points) > APART_M:
             break
-    return np.asarray(root_T_link)
+    return q, np.asarray(root_T_link)
 
 
 def _closest(points: Array) -> float:
@@ -111,9 +115,9 @@ def _closest(points: Array) -> float:
 def random_camera(points: Array, size: int, rng: Rng) -> tuple[Array, Array]:
     """camera_T_base (4, 4) and K (3, 3) of a picture of `size` px in which points (K, 3) m take a random share."""
     centre = points.mean(0) + rng.normal(0, 0.05, 3)
-    distance = np.linalg.norm(points - centre, axis=1).max() + np.exp(rng.uniform(*np.log(_DISTANCE_M)))
+    distance = np.linalg.norm(points - centre, axis=1).max() + np.exp(rng.uniform(*np.log(DISTANCE_M)))
     azimuth = rng.uniform(-np.pi, np.pi)
-    elevation = np.deg2rad(rng.uniform(-15, 65) if rng.random() < 0.85 else rng.uniform(-30, 85))
+    elevation = np.deg2rad(rng.uniform(*USUAL_DEG) if rng.random() < USUAL else rng.uniform(*ALL_DEG))
     level = np.array([np.cos(azimuth), np.sin(azimuth), 0])
     eye = centre + distance * (np.cos(elevation) * level + [0, 0, np.sin(elevation)])
     forward = (centre - eye) / distance

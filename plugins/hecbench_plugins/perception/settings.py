@@ -13,9 +13,6 @@ class ReadingSettings:
         coarse_px, fine_px: the longer sides of the picture in the first and second pass; the answers of a pass are
             averaged.
         fill: share of the second pass's picture that the robot takes.
-        smoothing: standard deviation of the blur before shrinking, in pixels of the small picture: it keeps aliases
-            out.
-        blur_below: scale below which a picture is blurred.
         robot: share from which on a cell is robot.
         piece: of the largest piece's area: smaller pieces are not the robot.
         least_confidence: chosen between 60 photographs with a robot (least 0.29) and 63 without one (largest 0.25,
@@ -30,8 +27,6 @@ class ReadingSettings:
     coarse_px: tuple[int, ...] = (320, 448)
     fine_px: tuple[int, ...] = (224, 288)
     fill: float = 0.78
-    smoothing: float = 0.35
-    blur_below: float = 0.6
     robot: float = 0.5
     piece: float = 0.3
     least_confidence: float = 0.26

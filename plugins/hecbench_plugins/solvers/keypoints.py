@@ -37,8 +37,8 @@ class Keypoints:
         model: a perception plugin or the folder of a trained network; None: one that knows the robot.
         refine: whether the camera is aligned with the network's masks from there, by `render_gn`'s first stages; where
             these end without an answer, that of the keypoints stays.
-        refined_views: views that are aligned at most, spread evenly: time grows with them, and the masks are off alike in
-            all.
+        refined_views: views that are aligned at most, spread evenly: time grows with them, and the masks of all
+            are off alike.
         least_trust: of a keypoint's heatmap that must lie at one place.
         limit_px: a keypoint farther than this from where the pose puts it is wrong, in pixels of a 640 px wide picture.
         rounds: of RANSAC.

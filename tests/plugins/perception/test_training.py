@@ -14,7 +14,8 @@ from hecbench_plugins.perception.network import PerceptionNet  # noqa: E402
 from hecbench_plugins.perception.onnx_export import to_onnx  # noqa: E402
 from hecbench_plugins.perception.plan import Plan  # noqa: E402
 from hecbench_plugins.perception.product import write_model  # noqa: E402
-from hecbench_plugins.perception.training import CHECKPOINT, Training  # noqa: E402
+from hecbench_plugins.perception.run import CHECKPOINT  # noqa: E402
+from hecbench_plugins.perception.training import Training  # noqa: E402
 
 from hecbench.errors import InputError  # noqa: E402
 
