@@ -9,11 +9,12 @@ holds still.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from hecbench.errors import InputError
+from hecbench.exchange.handedness import mirrored
 from hecbench.exchange.pose_numbers import PoseConvention
 from hecbench.exchange.stillness import (
     Stillness,
@@ -41,7 +42,6 @@ _CONVINCING = 0.1
 _SAME = 1e-6
 _MOST_EXAMINED = 20
 _MOST_NAMED = 3
-_MIRROR = np.array([1.0, -1.0, 1.0, 1.0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,9 +236,9 @@ def _cause(
     ranked: Sequence[_Candidate], robot: Sequence[PoseConvention], target: Sequence[PoseConvention]
 ) -> str:
     """What would make a reading hold still: another unit, or the other handedness."""
-    for what, mirrored in _mirrored(robot):
+    for what, turned in mirrored(_usual(robot)):
         best = min(
-            _candidates(mirrored, _usual(target), list(Mounting), False),
+            _candidates(turned, _usual(target), list(Mounting), False),
             key=lambda c: (
                 c.stillness.relative > _CONVINCING,
                 c.deviations,
@@ -258,25 +258,6 @@ def _cause(
                 "unit of one of the two"
             )
     return ""
-
-
-def _mirrored(stream: Sequence[PoseConvention]) -> Iterator[tuple[str, list[PoseConvention]]]:
-    """The usual readings in the other handedness, and what was done to them."""
-    usual = _usual(stream)
-    yield (
-        "the y axis of one of the two is turned round: one is left-handed (Unity, Unreal); write it in a right-handed "
-        "frame",
-        [replace(reading, poses=reading.poses * np.outer(_MIRROR, _MIRROR)) for reading in usual],
-    )
-    for axis, letter in enumerate("xyz"):
-        turned = [reading.poses.copy() for reading in usual]
-        for poses in turned:
-            poses[:, axis, 3] *= -1
-        yield (
-            f"the robot's {letter} has the other sign: its positions are left-handed, its rotations are not; turn "
-            f"{letter} round",
-            [replace(reading, poses=poses) for reading, poses in zip(usual, turned, strict=True)],
-        )
 
 
 def _proof(chosen: _Candidate, note: str) -> Proof:

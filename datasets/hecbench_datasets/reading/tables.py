@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import io
 import re
 import zipfile
@@ -16,15 +15,12 @@ import numpy as np
 from hecbench.errors import InputError
 from hecbench.se3 import Array
 from hecbench.system import files
-from hecbench_datasets.reading.robot_literals import literal_rows
+from hecbench_datasets.reading import delimited
+from hecbench_datasets.reading.delimited import all_numbers, is_number
 from hecbench_datasets.reading.sources import IMAGE_SUFFIXES, YAML_SUFFIXES, json_value, text, yaml_value
 
 TABLE_SUFFIXES = (".csv", ".txt", ".tsv", ".dat", ".xlsx", ".json", *YAML_SUFFIXES, ".npy", ".npz")
-_DECIMAL_COMMA = re.compile(r"[+-]?\d+,\d+([eE][+-]?\d+)?")
-_THOUSANDS_COMMA = re.compile(r"[+-]?\d{1,3}([.']\d{3})+,\d+")
-_THOUSANDS_POINT = re.compile(r"[+-]?\d{1,3}([,']\d{3})+\.\d+")
 _LIST = re.compile(r"\s*(?:p|array)?[\[(]+(.*?)[\])]+\s*", re.DOTALL)
-_BARE_LIST = re.compile(r"[\[\]()\d\s.,;eE+-]*[\[\]][\[\]()\d\s.,;eE+-]*")
 _NOTHING = frozenset({"", "nan", "none", "null", "n/a", "-"})
 _MOST_COLUMNS = 10_000
 _POSE_NUMBERS = 6
@@ -78,60 +74,7 @@ def read_table(path: Path) -> Table:
         return _from_records(numpy_arrays(path), str(path))
     if suffix in (".json", *YAML_SUFFIXES):
         return _from_records(json_value(path) if suffix == ".json" else yaml_value(path), str(path))
-    return _from_rows(_lines(text(path)), str(path))
-
-
-def _lines(content: str) -> list[list[str]]:
-    """Cells of the lines, a header in a comment included; decimal commas become points."""
-    lines = [line.strip() for line in content.splitlines()]
-    if not any("," in line or ";" in line for line in lines):  # a matrix as NumPy prints it
-        lines = [re.sub(r"[\[\]]", " ", x).strip() if _BARE_LIST.fullmatch(x) else x for x in lines]
-    data = [line for line in lines if line and not line.startswith(("#", "//", "%"))]
-    if not data:
-        return []
-    if (literals := literal_rows(data)) is not None:
-        return literals
-    first = lines.index(data[0])
-    header = (
-        lines[first - 1].lstrip("#/% ") if first and lines[first - 1].startswith(("#", "//", "%")) else ""
-    )
-    separator = next((mark for mark in ";\t," if _separates(mark, data)), None)
-    rows = [[_with_point(cell, separator) for cell in row] for row in _split(data, separator)]
-    titles = _split([header], separator)[0] if header else []
-    return [titles, *rows] if len(titles) == len(rows[0]) and not any(map(_is_number, titles)) else rows
-
-
-def _with_point(cell: str, separator: str | None) -> str:
-    """A number without signs between its thousands, and with a decimal point; other cells as they are."""
-    if separator != "," and _DECIMAL_COMMA.fullmatch(cell):
-        return cell.replace(",", ".")
-    if _THOUSANDS_COMMA.fullmatch(cell):
-        return cell.replace(".", "").replace("'", "").replace(",", ".")
-    if _THOUSANDS_POINT.fullmatch(cell):
-        return cell.replace(",", "").replace("'", "")
-    return cell
-
-
-def _separates(mark: str, lines: list[str]) -> bool:
-    """Whether the mark separates cells in most lines, and not the digits of decimal commas."""
-    if mark == "," and all(_DECIMAL_COMMA.fullmatch(word) for line in lines[-3:] for word in line.split()):
-        return False
-    return sum(mark in line for line in lines) > len(lines) / 2
-
-
-def _split(lines: list[str], separator: str | None) -> list[list[str]]:
-    if separator is None:
-        return [line.split() for line in lines]
-    rows = csv.reader(io.StringIO("\n".join(lines)), delimiter=separator, skipinitialspace=True)
-    cells = [[cell.strip() for cell in row] for row in rows]
-    while cells and all(row and row[-1] == "" for row in cells):
-        cells = [row[:-1] for row in cells]
-    if separator == "," and all(len(row) == len(cells[0]) for row in cells):
-        return cells
-    return [
-        [word for cell in row for word in (cell.split() if _all_numbers(cell.split()) else [cell])]
-        for row in cells
-    ]
+    return _from_rows(delimited.cells(text(path)), str(path))
 
 
 def _sheet(path: Path) -> list[list[str]]:
@@ -187,7 +130,7 @@ def _from_rows(rows: list[list[str]], source: str) -> Table:
     rows = [_expanded(row) for row in rows if row]
     if not rows:
         raise InputError(f"{source}: holds no row")
-    titled = len(rows) > 1 and not any(map(_is_number, rows[0])) and any(map(_is_number, rows[1]))
+    titled = len(rows) > 1 and not any(map(is_number, rows[0])) and any(map(is_number, rows[1]))
     names, body = (rows[0], rows[1:]) if titled else ([""] * len(rows[0]), rows)
     width = len(body[0])
     for number, row in enumerate(body, 1 + titled):
@@ -224,7 +167,7 @@ def _expanded(row: list[str]) -> list[str]:
         inner = _LIST.fullmatch(cell)
         words = re.split(r"[\s,;]+", re.sub(r"[\[\]()]", " ", inner[1]).strip()) if inner else [cell]
         bare = [re.sub(r"^p?[\[(]+|[\])]+$", "", word).strip() for word in words]
-        cells += bare if _all_numbers(bare) else [cell]
+        cells += bare if all_numbers(bare) else [cell]
     return cells
 
 
@@ -289,18 +232,6 @@ def _column(cells: list[Any]) -> Array | list[str]:
         return values if np.isfinite(values).all() else [str(cell) for cell in cells]
     except (TypeError, ValueError):
         return [str(cell) for cell in cells]
-
-
-def _is_number(cell: str) -> bool:
-    try:
-        float(cell)
-    except (TypeError, ValueError):
-        return False
-    return True
-
-
-def _all_numbers(cells: list[str]) -> bool:
-    return bool(cells) and all(map(_is_number, cells))
 
 
 def image_column(table: Table) -> list[str] | None:

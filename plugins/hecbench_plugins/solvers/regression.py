@@ -32,8 +32,8 @@ class Regression:
         """The median of what the network answers to each picture.
 
         Raises:
-            Refusal: the camera is on the flange, or no picture has joints.
-            SolverFailure: there are no weights, they are of another robot, no picture shows a robot, or the views
+            Refusal: the camera is on the flange, the weights are of another robot, or no picture has joints.
+            SolverFailure: there are no weights, no picture shows a robot, or the views
                 contradict each other.
         """
         from hecbench_plugins.regression.combining import combined
@@ -70,9 +70,9 @@ class Regression:
         camera, images = recording.present.camera, recording.images or ()
         try:
             network = model_of(self.settings.model)
-            network.card.require(robot_of(recording), recording.name)
-        except (InputError, Refusal) as error:
+        except InputError as error:
             raise SolverFailure(str(error)) from error
+        network.card.require(robot_of(recording), recording.name)
         try:
             posed = PosedRobot.of(recording, meshes=False)
             order = [posed.joint_names.index(name) for name in network.card.joints]

@@ -188,7 +188,7 @@ def test_what_cannot_be_answered_is_said_in_one_line(folder, crane, tmp_path):
     recording = photographed(crane)
     with pytest.raises(SolverFailure, match=r"model\.json"):
         solved(recording, tmp_path)
-    with pytest.raises(SolverFailure, match="the robot is ur5e, and the network knows crane"):
+    with pytest.raises(Refusal, match="the robot is ur5e, and the network knows crane"):
         solved(replace(recording, robot=RobotDescription(model="ur5e")), folder)
     with pytest.raises(Refusal, match="on the flange"):
         solved(replace(recording, mounting=Mounting.EYE_IN_HAND), folder)
