@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from hecbench import statistics
@@ -13,7 +14,8 @@ from hecbench.report.tables import Group, Place, Table, error_mm
 _HEADER = ("level", "first", "TRE median mm [95 %]", "answered", "not distinguished from it")
 _NOTE = (
     "First: the least median TRE of all runs. Not distinguished from it: solvers of rank 1 whose errors on the same "
-    "recordings do not differ by the signed-rank test (p of 0.05, Bonferroni); more recordings may tell them apart."
+    "recordings do not differ by the signed-rank test (p of 0.05 over all pairs of solvers, Bonferroni: which one is "
+    "first was seen on the same recordings); more recordings may separate them."
 )
 
 
@@ -34,19 +36,23 @@ def _row(group: Group) -> tuple[str, ...]:
         like_it = "not known from fewer than 5 runs"
     else:
         like_it = ", ".join(
-            _not_distinguished(first, [place for place in others if place.rank == first.rank])
+            _not_distinguished(
+                first,
+                [place for place in others if place.rank == first.rank],
+                math.comb(len(group.places), 2),
+            )
         )
     return group.title, first.solver, interval(first.median_mm), first.answered, like_it or ABSENT
 
 
-def _not_distinguished(first: Place, rivals: Sequence[Place]) -> list[str]:
+def _not_distinguished(first: Place, rivals: Sequence[Place], pairs: int) -> list[str]:
     reference = _errors_mm(first.runs)
     names = []
     for rival in rivals:
         errors = _errors_mm(rival.runs)
         shared = sorted(reference.keys() & errors.keys())
         p = statistics.paired_error_p([reference[key] for key in shared], [errors[key] for key in shared])
-        if not p * len(rivals) < 1 - statistics.CONFIDENCE:
+        if not p * pairs < 1 - statistics.CONFIDENCE:
             names.append(rival.solver)
     return names
 
