@@ -32,10 +32,20 @@ def receive(running_controller):
 
 @pytest.fixture(scope="module")
 def control_client(running_controller):
-    client = rtde_control.RTDEControlInterface(running_controller.host)
+    client = connected(running_controller.host)
     yield client
     client.stopScript()
     client.disconnect()
+
+
+def connected(host, attempts=3):
+    """The client, which gives up at once when a busy machine makes it too slow for its own handshake."""
+    for _ in range(attempts - 1):
+        try:
+            return rtde_control.RTDEControlInterface(host)
+        except RuntimeError:
+            time.sleep(1)
+    return rtde_control.RTDEControlInterface(host)
 
 
 @pytest.fixture

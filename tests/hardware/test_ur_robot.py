@@ -368,7 +368,6 @@ import numpy as np
 from hecbench_hardware.kinematics import ARMS
 from hecbench_hardware.ur.robot import UrRobot
 from hecbench_hardware.ur.stream import Supervision
-from hecbench_hardware.ur.stream import Supervision
 robot = UrRobot(sys.argv[1], ARMS["ur5e"], supervision=Supervision(max_age_s=1.0, leniency=10))
 robot.enable()
 print("moving", flush=True)
@@ -380,7 +379,12 @@ robot.move_joints(robot.state().joints_rad + [1, 0, 0, 0, 0, 0], speed_rad_s=0.0
 def test_a_killed_program_leaves_no_process_and_no_motion(controller, connect, number):
     watcher = connect()
     program = subprocess.Popen(
-        [sys.executable, "-c", MOVER, controller.host], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+        [sys.executable, "-c", MOVER, controller.host],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        preexec_fn=lambda: signal.signal(
+            signal.SIGINT, signal.SIG_DFL
+        ),  # ignored in the background of a shell
     )
     try:
         program.stdout.readline()
