@@ -65,7 +65,7 @@ def _shifted(
     width: int,
 ) -> tuple[Array, Array]:
     """The poses (n, 4, 4), each turned to where the photographs changed, and the costs (n,) of that."""
-    shifts = [_Shifts(mesh, *seen, width) for _ in range(threads.count())]
+    shifts = [_Shifts(mesh, *seen, width) for _ in range(min(threads.count(), len(poses)))]
     pairs = zip(shifts, np.array_split(poses, len(shifts)), strict=True)
     rays, costs = zip(*threads.each(lambda pair: pair[0](pair[1]), pairs), strict=True)
     return _turn_to(np.concatenate(rays)) @ poses, np.concatenate(costs)
