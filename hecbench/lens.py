@@ -119,9 +119,14 @@ def _distort(
         bent = angle * (1 + a2 * (k[0] + a2 * (k[1] + a2 * (k[2] + a2 * k[3]))))
         factor = np.where(r == 0, 1.0, bent / np.where(r == 0, 1.0, r))
         return np.asarray(points * factor[..., None])
-    radial = (1 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]))) / (1 + r2 * (k[5] + r2 * (k[6] + r2 * k[7])))
-    u = x * radial + 2 * k[2] * x * y + k[3] * (r2 + 2 * x * x) + r2 * (k[8] + r2 * k[9])
-    v = y * radial + k[2] * (r2 + 2 * y * y) + 2 * k[3] * x * y + r2 * (k[10] + r2 * k[11])
+    radial = 1 + r2 * (k[0] + r2 * (k[1] + r2 * k[4]))
+    if k[5:8].any():
+        radial = radial / (1 + r2 * (k[5] + r2 * (k[6] + r2 * k[7])))
+    u = x * radial + 2 * k[2] * x * y + k[3] * (r2 + 2 * x * x)
+    v = y * radial + k[2] * (r2 + 2 * y * y) + 2 * k[3] * x * y
+    if k[8:12].any():
+        u = u + r2 * (k[8] + r2 * k[9])
+        v = v + r2 * (k[10] + r2 * k[11])
     if not k[12:].any():
         return np.stack([u, v], -1)
     tilted = np.stack([u, v, np.ones_like(u)], -1) @ _tilt(k[12], k[13]).T
@@ -142,19 +147,27 @@ def undistort(points: Array, camera: CameraModel) -> Array:
     found = points.copy()
     with np.errstate(all="ignore"):
         for _ in range(_ROUNDS):
-            left = _distort(found, coefficients, model) - points
-            step = np.linalg.pinv(_by_point(found, coefficients, model)) @ np.nan_to_num(left)[..., None]
-            found = found - step[..., 0]
+            bent, by_point = _with_derivative(found, coefficients, model)
+            step = _solved(by_point, np.nan_to_num(bent - points))
+            found = found - step
             if np.nanmax(np.abs(step), initial=0.0) < _CONVERGED:
                 break
         left = _distort(found, coefficients, model) - points
     return np.where((np.abs(left) < _UNDISTORTED).all(-1, keepdims=True), found, np.nan)
 
 
-def _by_point(points: Array, coefficients: Array, model: str) -> Array:
-    """Derivatives (..., 2, 2) of the distorted coordinates by the ideal ones."""
-    moved = [_distort(points + 1j * _STEP * axis, coefficients, model).imag / _STEP for axis in np.eye(2)]
-    return np.nan_to_num(np.stack(moved, -1))
+def _with_derivative(points: Array, coefficients: Array, model: str) -> tuple[Array, Array]:
+    """Distorted coordinates (..., 2), and their derivatives (..., 2, 2) by the ideal ones."""
+    moved = [_distort(points + 1j * _STEP * axis, coefficients, model) for axis in np.eye(2)]
+    return moved[0].real, np.nan_to_num(np.stack([each.imag / _STEP for each in moved], -1))
+
+
+def _solved(A: Array, b: Array) -> Array:
+    """x (..., 2) of A (..., 2, 2) x = b (..., 2); 0 where A is singular."""
+    determinant = A[..., 0, 0] * A[..., 1, 1] - A[..., 0, 1] * A[..., 1, 0]
+    x = A[..., 1, 1] * b[..., 0] - A[..., 0, 1] * b[..., 1]
+    y = A[..., 0, 0] * b[..., 1] - A[..., 1, 0] * b[..., 0]
+    return np.stack([x, y], -1) / np.where(determinant == 0, np.inf, determinant)[..., None]
 
 
 def normalised(camera: CameraModel, pixels: Array) -> Array:
@@ -222,7 +235,6 @@ def pixels_and_derivative(points_c: Array, parameters: Array, model: str) -> tup
     ideal = points_c[:, :2] / depth
     distorted, by_ideal = ideal, np.broadcast_to(np.eye(2), (len(ideal), 2, 2))
     if model == EQUIDISTANT or coefficients.any():
-        distorted = np.asarray(_distort(ideal, coefficients, model))
-        by_ideal = _by_point(ideal, coefficients, model)
+        distorted, by_ideal = _with_derivative(ideal, coefficients, model)
     across = focal[:, None] * by_ideal / depth[..., None]
     return focal * distorted + centre, np.concatenate([across, -(across @ ideal[..., None])], -1)

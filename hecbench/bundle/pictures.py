@@ -42,6 +42,10 @@ class Normals:
         pairs = [(getattr(self, item.name), getattr(there, item.name)) for item in fields(self)]
         return Normals(*(np.where(better.reshape(-1, *[1] * (a.ndim - 1)), b, a) for a, b in pairs))
 
+    def only(self, chosen: NDArray[np.bool_]) -> Normals:
+        """Those of the `chosen` (M,) pictures."""
+        return Normals(*(getattr(self, item.name)[chosen] for item in fields(self)))
+
 
 def linearised(
     camera_T_target: Array, points_m: Array, corners_px: Array, sensor: Sensor, parameters: Array
@@ -57,7 +61,7 @@ def linearised(
     costs = (residuals**2).sum((1, 2))
     costs[(behind.reshape(seen.shape) & seen).any(1)] = np.inf
     by_point = by_point.reshape(*shape, 3) * seen[..., None, None]
-    by_pose = np.concatenate([np.cross(points_c[:, :, None], by_point), by_point], -1)
+    by_pose = np.concatenate([-by_point @ se3.hat(points_c), by_point], -1)
     by_shared = by_parameter.reshape(*shape, len(parameters)) * seen[..., None, None]
     return Normals(
         residuals, costs, by_pose.reshape(*rows, 6), by_shared.reshape(*rows, len(parameters)), points_c
@@ -73,23 +77,27 @@ def refined(
     """
     poses, none = camera_T_target.copy(), np.zeros(0)
     at = linearised(poses, points_m, corners_px, sensor, none)
-    damping = np.full(len(poses), 1e-4)
+    costs, damping, moving = at.costs.copy(), np.full(len(poses), 1e-4), np.arange(len(poses))
     for _ in range(_ITERATIONS):
         transposed = np.swapaxes(at.by_pose, 1, 2)
         information = transposed @ at.by_pose
-        gradient = transposed @ at.residuals_px.reshape(len(poses), -1, 1)
-        moved = se3.exp(-np.linalg.solve(_damped(information, damping[:, None]), gradient)[..., 0]) @ poses
-        there = linearised(moved, points_m, corners_px, sensor, none)
+        gradient = transposed @ at.residuals_px.reshape(len(moving), -1, 1)
+        step = np.linalg.solve(_damped(information, damping[:, None]), gradient)[..., 0]
+        moved = se3.exp(-step) @ poses[moving]
+        there = linearised(moved, points_m, corners_px[moving], sensor, none)
         better = there.costs <= at.costs
         both = np.isfinite(at.costs) & np.isfinite(there.costs)
-        change = np.subtract(at.costs, there.costs, where=both, out=np.full(len(poses), np.inf))
-        poses[better] = moved[better]
+        change = np.subtract(at.costs, there.costs, where=both, out=np.full(len(moving), np.inf))
+        poses[moving[better]] = moved[better]
         damping = np.where(better, np.maximum(damping / 10, 1e-12), damping * 10)
         at = at.where(better, there)
-        if (np.abs(change) <= _CONVERGED * at.costs + _EXACT).all():
+        costs[moving] = at.costs
+        left = np.abs(change) > _CONVERGED * at.costs + _EXACT
+        at, damping, moving = at.only(left), damping[left], moving[left]
+        if not len(moving):
             break
     seen = np.isfinite(corners_px).all(-1).sum(1)
-    return poses, np.sqrt(at.costs / np.maximum(seen, 1))
+    return poses, np.sqrt(costs / np.maximum(seen, 1))
 
 
 @dataclass(frozen=True, eq=False)

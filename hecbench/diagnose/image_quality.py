@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
+from dataclasses import dataclass
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,6 +13,7 @@ from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity, names
 from hecbench.errors import InputError
 from hecbench.recording import Recording
+from hecbench.system import threads
 
 ID = "image_quality"
 LEAST_SHARPNESS = 0.1
@@ -33,20 +38,19 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
     reasons: list[str] = []
     sharpness: dict[int, float] = {}
     seen: dict[bytes, int] = {}
-    for i in indices:
-        try:
-            grey = recording.image(i).mean(2)
-        except (InputError, OSError) as error:
+    looks = threads.each(partial(_look, recording), indices)
+    for i, look in zip(indices, looks, strict=True):
+        if isinstance(look, str):
             faults["unreadable"].append(i)
-            reasons.append(str(error))
+            reasons.append(look)
             continue
-        if max((grey < _DARK).mean(), (grey > _BRIGHT).mean()) > _MOST_CLIPPED:
+        if look.clipped > _MOST_CLIPPED:
             faults["dark or overexposed"].append(i)
-        elif (content := grey[::4, ::4].tobytes()) in seen:
-            faults["repeated"] += [seen[content], i]
+        elif look.content in seen:
+            faults["repeated"] += [seen[look.content], i]
         else:
-            seen[content] = i
-        sharpness[i] = _sharpness(_around_target(recording, i, grey))
+            seen[look.content] = i
+        sharpness[i] = look.sharpness
     least = LEAST_SHARPNESS * float(np.median(list(sharpness.values()) or [0.0]))
     faults["blurred"] = [i for i, value in sharpness.items() if value < least]
     found = {kind: tuple(recording.sample_ids[i] for i in which) for kind, which in faults.items() if which}
@@ -58,7 +62,32 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
     return Finding(ID, Severity.WARNING, summary, _CURE, float(len(concerned)), 0.0, concerned), case
 
 
-def _around_target(recording: Recording, index: int, grey: NDArray[np.float64]) -> NDArray[np.float64]:
+@dataclass(frozen=True)
+class _Look:
+    """The larger share of pixels that are dark or overexposed, a digest of some pixels, and the sharpness."""
+
+    clipped: float
+    content: bytes
+    sharpness: float
+
+
+def _look(recording: Recording, index: int) -> _Look | str:
+    """What one image shows, or why it cannot be read."""
+    try:
+        grey = _grey(recording.image(index))
+    except (InputError, OSError) as error:
+        return str(error)
+    clipped = max((grey < _DARK).mean(), (grey > _BRIGHT).mean())
+    content = hashlib.sha256(grey[::4, ::4].tobytes()).digest()
+    return _Look(float(clipped), content, _sharpness(_around_target(recording, index, grey)))
+
+
+def _grey(image: NDArray[np.uint8]) -> NDArray[np.float32]:
+    red, green, blue = np.moveaxis(image.astype(np.float32), 2, 0)
+    return np.asarray((red + green + blue) / 3)
+
+
+def _around_target(recording: Recording, index: int, grey: NDArray[np.float32]) -> NDArray[np.float32]:
     """The part of an image that shows the target, or all of it."""
     if recording.corners_px is None or not np.isfinite(recording.corners_px[index]).any():
         return grey
@@ -68,7 +97,7 @@ def _around_target(recording: Recording, index: int, grey: NDArray[np.float64]) 
     return part if min(part.shape) >= 3 else grey
 
 
-def _sharpness(grey: NDArray[np.float64]) -> float:
+def _sharpness(grey: NDArray[np.float32]) -> float:
     if min(grey.shape) < 3:
         return 0.0
     laplacian = grey[1:-1, :-2] + grey[1:-1, 2:] + grey[:-2, 1:-1] + grey[2:, 1:-1] - 4 * grey[1:-1, 1:-1]

@@ -27,18 +27,32 @@ def standstills(base_T_flange: Array) -> Labels:
 
     Samples without a pose (NaN) are each their own.
     """
+    count = len(base_T_flange)
+    known = np.flatnonzero(np.isfinite(base_T_flange).all((1, 2)))
+    rotations = base_T_flange[known, :3, :3].reshape(-1, 9) / (np.sqrt(2) * STILL_RAD)
+    places = np.concatenate([base_T_flange[known, :3, 3] / STILL_M, rotations], 1)
+    if _all_apart(places):
+        return np.arange(count)
+
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
-    count = len(base_T_flange)
-    known = np.flatnonzero(np.isfinite(base_T_flange).all((1, 2)))
-    rotations = base_T_flange[known, :3, :3].reshape(-1, 9) / (np.sqrt(2) * STILL_RAD)
-    near = cKDTree(np.concatenate([base_T_flange[known, :3, 3] / STILL_M, rotations], 1)).query_pairs(
-        1.0, output_type="ndarray"
-    )
+    near = cKDTree(places).query_pairs(1.0, output_type="ndarray")
     links = coo_array((np.ones(len(near)), (known[near[:, 0]], known[near[:, 1]])), (count, count))
     return np.asarray(connected_components(links, directed=False)[1], np.int64)
+
+
+def _all_apart(places: Array) -> bool:
+    """Whether each of the places (N, D) is more than 1 from all others along some axis; False may be wrong."""
+    near = np.ones(len(places), bool)
+    for along in places.T:
+        order = np.argsort(along)
+        close = np.diff(along[order]) <= 1
+        beside = np.zeros(len(places), bool)
+        beside[order[:-1][close]] = beside[order[1:][close]] = True
+        near &= beside
+    return not near.any()
 
 
 def pose_labels(recording: Recording, indices: ArrayLike) -> Labels:

@@ -7,6 +7,8 @@ be known from one image, but a motion turns hand and target by the same angle wh
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -54,10 +56,35 @@ def planar_candidates(recording: Recording) -> tuple[Array, Array]:
         raise Refusal(
             "has no camera_T_target, and not all of corners_px, target and camera.K to compute it from"
         )
-    poses = np.full((len(recording), 2, 4, 4), np.nan)
-    errors_px = np.full((len(recording), 2), np.nan)
+    return _planar_candidates(_Seen(target, camera, corners))
+
+
+class _Seen:
+    """What planar candidates depend on; equal by content, since several steps ask for those of the same pictures."""
+
+    def __init__(self, target: Target, camera: CameraModel, corners_px: Array) -> None:
+        self.target, self.camera, self.corners_px = target, camera, corners_px
+        self._content = (
+            target.points_m.tobytes(),
+            camera.distortion_model,
+            lens.parameters_of(camera).tobytes(),
+            corners_px.tobytes(),
+        )
+
+    def __hash__(self) -> int:
+        return hash(self._content)
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Seen) and self._content == other._content
+
+
+@lru_cache(maxsize=8)
+def _planar_candidates(seen: _Seen) -> tuple[Array, Array]:
+    target, camera, corners = seen.target, seen.camera, seen.corners_px
+    poses = np.full((len(corners), 2, 4, 4), np.nan)
+    errors_px = np.full((len(corners), 2), np.nan)
     ideal = normalised(camera, corners)
-    found = [(i, pose) for i in range(len(recording)) for pose in _starts(target, ideal[i])]
+    found = [(i, pose) for i in range(len(corners)) for pose in _starts(target, ideal[i])]
     if not found:
         return poses, errors_px
     owners = np.array([i for i, _ in found])
@@ -70,6 +97,7 @@ def planar_candidates(recording: Recording) -> tuple[Array, Array]:
         if len(own):
             best_first = own[[0, min(1, len(own) - 1)]]
             poses[i], errors_px[i] = refined_poses[best_first], refined_px[best_first]
+    poses.flags.writeable = errors_px.flags.writeable = False
     return poses, errors_px
 
 
