@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hecbench.errors import InputError, Refusal, SolverFailure
 from hecbench.estimate import Estimate, Termination
@@ -24,9 +23,8 @@ from hecbench_plugins.perception.options import MODEL_OPTION
 if TYPE_CHECKING:
     from hecbench_plugins.perception.keypoint_pose import Sightings
 
-Mask = NDArray[np.uint8]
-
-_ROBOT = 0.5
+_DESCENTS = 3
+"""Fewer than about a start of unknown quality: what many keypoints agree on is near."""
 
 
 @dataclass(frozen=True)
@@ -35,10 +33,8 @@ class Keypoints:
 
     Attributes:
         model: a perception plugin or the folder of a trained network; None: one that knows the robot.
-        refine: whether the camera is aligned with the network's masks from there, by `render_gn`'s first stages; where
-            these end without an answer, that of the keypoints stays.
-        refined_views: views that are aligned at most, spread evenly: time grows with them, and the masks of all
-            are off alike.
+        refine: whether the drawn robot is aligned with the photographs from there, as `render_gn` does without masks;
+            where that ends without an answer, that of the keypoints stays.
         least_trust: of a keypoint's heatmap that must lie at one place.
         limit_px: a keypoint farther than this from where the pose puts it is wrong, in pixels of a 640 px wide picture.
         rounds: of RANSAC.
@@ -50,7 +46,6 @@ class Keypoints:
 
     model: str | None = None
     refine: bool = False
-    refined_views: int = 10
     least_trust: float = 0.2
     limit_px: float = 20.0
     rounds: int = 1000
@@ -74,7 +69,7 @@ class Keypoints:
         )
 
         camera = recording.present.camera
-        seen, views, masks = self._sightings(recording)
+        seen, views = self._sightings(recording)
         if len(seen.points) < self.fewest:
             raise Refusal(
                 f"{recording.name}: {len(seen.points)} keypoints are trusted in {views} images, {self.fewest} are"
@@ -110,10 +105,10 @@ class Keypoints:
                 "rms_px": answer.rms * float(camera.intrinsics[0, 0]),
             },
         )
-        return _aligned(found, recording, masks, self.refined_views, rng) if self.refine else found
+        return _aligned(found, recording, rng) if self.refine else found
 
-    def _sightings(self, recording: Recording) -> tuple[Sightings, int, list[Mask | None]]:
-        """Every trusted keypoint of every image that has joints, how many such images there are, and their masks."""
+    def _sightings(self, recording: Recording) -> tuple[Sightings, int]:
+        """Every trusted keypoint of every image that has joints, and how many such images there are."""
         import cv2
 
         from hecbench.robots.posed import PosedRobot
@@ -128,14 +123,11 @@ class Keypoints:
             raise Refusal(str(error)) from error
         images = recording.images or ()
         rows, views = [], 0
-        masks: list[Mask | None] = [None] * len(recording)
         for sample, poses in zip(posed.samples.tolist(), parent_T_link, strict=True):
             if images[sample] is None:
                 continue
             views += 1
             sight = perceiver.see(recording.image(sample))
-            if self.refine:
-                masks[sample] = np.where(sight.visible() > _ROBOT, np.uint8(255), np.uint8(0))
             sure = np.flatnonzero(sight.trust > self.least_trust)
             points = perceiver.keypoint_positions(robot_of(recording), posed.model.links, poses)[sure]
             pixels = sight.keypoints[sure].reshape(-1, 1, 2)
@@ -149,30 +141,25 @@ class Keypoints:
             raise Refusal(
                 f"{recording.name}: no keypoint is trusted in {views} images that have joints: another robot?"
             )
-        return Sightings._make(np.concatenate(values) for values in zip(*rows, strict=True)), views, masks
+        return Sightings._make(np.concatenate(values) for values in zip(*rows, strict=True)), views
 
 
-def _aligned(
-    found: Estimate, recording: Recording, masks: list[Mask | None], views: int, rng: np.random.Generator
-) -> Estimate:
-    """The answer aligned with the masks of some views, or as it was, and in `refined` which of the two."""
+def _aligned(found: Estimate, recording: Recording, rng: np.random.Generator) -> Estimate:
+    """The answer aligned with the photographs, or as it was, and in `refined` which of the two."""
+    from hecbench_plugins.maskless.solver import Maskless
     from hecbench_plugins.perception.choice import robot_of
-    from hecbench_plugins.second_order.render_gn import RenderGN
 
     robot = recording.present.robot
     if robot.model is not None:
         robot = replace(robot, model=robot_of(recording))
-    masked = np.flatnonzero([mask is not None for mask in masks])
-    chosen = masked[np.unique(np.linspace(0, len(masked) - 1, views).round().astype(int))]
-    ready = replace(
-        recording, masks=tuple(masks), robot=robot, initial_parent_T_camera=found.parent_T_camera
-    ).subset(chosen)
+    started = replace(recording, robot=robot, initial_parent_T_camera=found.parent_T_camera)
     try:
-        aligned = RenderGN()(ready, rng=rng)
+        aligned = Maskless(restarts=_DESCENTS, attempts=1)(started, rng=rng)
     except (Refusal, SolverFailure) as reason:
         return replace(found, diagnostics={**found.diagnostics, "refined": f"no: {reason}"})
-    diagnostics = {**aligned.diagnostics, **found.diagnostics, "refined": "by the masks"}
-    return replace(aligned, diagnostics=diagnostics)
+    return replace(
+        aligned, diagnostics={**aligned.diagnostics, **found.diagnostics, "refined": "by the photographs"}
+    )
 
 
 def _yes(text: str) -> bool:
@@ -198,6 +185,6 @@ def hecbench_solvers() -> Iterable[SolverSpec]:
         slow=True,
         options=(
             MODEL_OPTION,
-            Option("refine", _yes, "align with the network's masks from there: yes or no"),
+            Option("refine", _yes, "align with the photographs from there: yes or no"),
         ),
     )

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from hecbench_plugins.maskless.solver import Maskless
 from hecbench_plugins.perception import choice
 from hecbench_plugins.perception.keypoint_pose import Sightings, consensus, independent, refined
 from hecbench_plugins.segmenters.learned import Learned
@@ -109,15 +110,29 @@ def test_the_covariance_is_that_of_the_errors():
     assert 4 < np.median(normalised) < 12  # chi-square of 6: 5.3; 20 clusters make it a little larger
 
 
-def test_the_masks_refine_what_the_keypoints_found(lit):
+def test_the_photographs_refine_what_the_keypoints_found(lit):
     spec = registry.load().get(Kind.SOLVER, "keypoints", SolverSpec)
     blind = replace(lit.without_truth(), initial_parent_T_camera=None, masks=None)
     estimate = spec.factory()(blind, rng=np.random.default_rng(0))
-    assert estimate.diagnostics["refined"] == "by the masks"
-    assert se3.translation_error_m(lit.truth_parent_T_camera, estimate.parent_T_camera) < 0.01
+    assert estimate.diagnostics["refined"] == "by the photographs"
+    assert estimate.diagnostics["keypoint_kinds"] >= 4
+    assert se3.translation_error_m(lit.truth_parent_T_camera, estimate.parent_T_camera) < 0.005
     rough = spec.configured({"refine": "no"}).factory()(blind, rng=np.random.default_rng(0))
     assert "refined" not in rough.diagnostics
     assert se3.translation_error_m(lit.truth_parent_T_camera, rough.parent_T_camera) < 0.15
+
+
+def test_photographs_that_confirm_nothing_leave_the_answer_of_the_keypoints(lit, monkeypatch):
+    def unsure(self, recording, *, rng):
+        raise SolverFailure("the photographs confirm 3 % of the contour")
+
+    monkeypatch.setattr(Maskless, "__call__", unsure)
+    refined, rough = (
+        Keypoints(refine=refine)(lit.without_truth(), rng=np.random.default_rng(0))
+        for refine in (True, False)
+    )
+    assert refined.diagnostics["refined"] == "no: the photographs confirm 3 % of the contour"
+    np.testing.assert_array_equal(refined.parent_T_camera, rough.parent_T_camera)
 
 
 def test_a_point_that_stands_still_counts_once():
