@@ -23,6 +23,7 @@ from hecbench import registry, se3
 from hecbench.errors import InputError
 from hecbench.recording import Mounting
 from hecbench.running import solving
+from hecbench.samples.spread import evenly
 from hecbench.specs import Kind, SolverSpec
 
 SOLVERS = ("andreff", "daniilidis", "horaud", "li", "park", "shah", "single3d_iterative", "tsai")
@@ -39,9 +40,7 @@ def keyframes(poses):
             or se3.translation_error_m(last, pose) > LEAST_STEP_M
         ):
             kept.append(i)
-    if len(kept) > MOST_KEYFRAMES:
-        kept = [kept[i] for i in np.linspace(0, len(kept) - 1, MOST_KEYFRAMES).round().astype(int)]
-    return kept
+    return [kept[i] for i in evenly(len(kept), MOST_KEYFRAMES)]
 
 
 def errors_of_X(recording, estimate, X_true):

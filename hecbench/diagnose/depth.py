@@ -7,6 +7,7 @@ import numpy as np
 from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity, names
 from hecbench.errors import InputError
+from hecbench.samples.spread import evenly
 
 ID = "depth"
 NEAREST_M, FARTHEST_M = 0.15, 12.0
@@ -31,9 +32,8 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
     indices = [i for i, source in enumerate(recording.depths or ()) if source is not None]
     if not indices:
         return None, case
-    places = np.linspace(0, len(indices) - 1, min(len(indices), _MOST_EXAMINED)).round().astype(int)
     faulty, reasons, empty, medians = [], [], [], []
-    for i in np.array(indices)[np.unique(places)].tolist():
+    for i in np.array(indices)[evenly(len(indices), _MOST_EXAMINED)].tolist():
         try:
             depth = recording.depth(i)
         except (InputError, OSError) as error:

@@ -15,6 +15,7 @@ from hecbench.estimate import Estimate
 from hecbench.recording import Recording
 from hecbench.rendering.undistort import Undistortion
 from hecbench.report.overlay import Overlay
+from hecbench.samples.spread import evenly
 from hecbench.se3 import Array
 from hecbench.system import files
 
@@ -57,10 +58,7 @@ def _chosen(recording: Recording) -> list[int]:
         for i, image in enumerate(images)
         if image is not None and (posed is None or np.isfinite(posed[i]).all())
     ]
-    if not usable:
-        return []
-    places = np.unique(np.linspace(0, len(usable) - 1, _COUNT).round().astype(int))
-    return [usable[i] for i in places]
+    return [usable[i] for i in evenly(len(usable), _COUNT)]
 
 
 def _drawer(recording: Recording, estimate: Estimate) -> Callable[[int], Picture]:

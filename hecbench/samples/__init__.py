@@ -1,1 +1,1 @@
-"""What samples tell together: how far an answer may contradict them, and which of them count once."""
+"""What samples tell together: how far an answer may contradict them, which count once, and which stand for all."""

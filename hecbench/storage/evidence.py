@@ -18,6 +18,7 @@ import numpy as np
 from hecbench.errors import InputError
 from hecbench.lens import OPENCV, CameraModel
 from hecbench.recording import Mounting, Recording
+from hecbench.samples.spread import evenly
 from hecbench.se3 import Array
 from hecbench.system import files
 
@@ -93,7 +94,7 @@ def _pictures(recording: Recording) -> dict[int, bytes]:
     from PIL import Image
 
     pictures = {}
-    for index in np.unique(np.linspace(0, len(recording) - 1, _PICTURES).round().astype(int)).tolist():
+    for index in evenly(len(recording), _PICTURES).tolist():
         if recording.images is None or recording.images[index] is None:
             continue
         try:

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from hecbench import se3
+from hecbench.samples.spread import evenly
 from hecbench.se3 import Array
 from hecbench_plugins.depth.views import FEWEST_VIEWS, DepthViews
 from hecbench_plugins.start_search import by_photographs
@@ -19,7 +20,8 @@ _APART = 0.08
 def around(views: DepthViews, start: Array, rng: np.random.Generator) -> Iterator[Array]:
     """The best camera_T_parent of draws around a start parent_T_camera, by the mean offset of depth."""
     settings = views.settings
-    ball, level, chosen = settings.around, settings.search_level, views.spread(settings.search_views)
+    ball, level = settings.around, settings.search_level
+    chosen = evenly(len(views), settings.search_views).tolist()
     poses = se3.inverse(ball.pose(start, ball.draw(rng, settings.draws)))
     costs_m, pixels = views.costs(poses, chosen, level)
     scores = np.where(pixels >= settings.least_pixels / level**2, -costs_m, -np.inf)

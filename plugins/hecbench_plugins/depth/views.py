@@ -117,10 +117,6 @@ class DepthViews:
     def __len__(self) -> int:
         return len(self.depths)
 
-    def spread(self, count: int) -> list[int]:
-        """Indices of so many views, evenly spread."""
-        return sorted({round(place) for place in np.linspace(0, len(self) - 1, count)})
-
     def moved(self, level: int) -> NDArray[np.float32]:
         """(N, H, W) 1 where something is nearer than the background that a fixed camera sees, 0 elsewhere."""
         depths = np.stack([depth[::level, ::level] for depth in self.depths])

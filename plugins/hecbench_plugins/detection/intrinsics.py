@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel
+from hecbench.samples.spread import evenly
 from hecbench.se3 import Array
 from hecbench_plugins.detection.settings import INTRINSICS
 
@@ -150,8 +151,7 @@ def _lens(views: Views, size: tuple[int, int]) -> tuple[str, ...]:
     """The richest lens that predicts left-out views as well as any, and is known up to the corners."""
     if len(views) < INTRINSICS.folds:
         return INTRINSICS.few_views_lens
-    chosen = np.unique(np.linspace(0, len(views) - 1, INTRINSICS.most_compared).round().astype(int))
-    compared = [views[i] for i in chosen]
+    compared = [views[i] for i in evenly(len(views), INTRINSICS.most_compared)]
     errors = [float(_predicted(compared, size, lens).mean()) for lens in LENSES]
     good = [
         lens for lens, error in zip(LENSES, errors, strict=True) if error <= INTRINSICS.as_well * min(errors)

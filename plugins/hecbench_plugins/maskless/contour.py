@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 
 from hecbench.rendering import RenderMesh
 from hecbench.rendering.undistort import shrunk_intrinsics
+from hecbench.samples.spread import evenly
 from hecbench.se3 import Array
 from hecbench.system import threads
 from hecbench_plugins.maskless import contour_kernels
@@ -40,7 +41,7 @@ class Background:
     @staticmethod
     def of(images: Spool) -> Background:
         """From photographs of one fixed camera; of many, from some that are spread evenly."""
-        chosen = np.unique(np.linspace(0, len(images) - 1, CONTOUR.most_for_background).round().astype(int))
+        chosen = evenly(len(images), CONTOUR.most_for_background)
         image, agreement = scene_background.background(images.subset(chosen.tolist()))
         return Background(np.round(image).astype(np.uint8), agreement)
 

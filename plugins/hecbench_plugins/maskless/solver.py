@@ -14,6 +14,7 @@ from hecbench.estimate import Estimate
 from hecbench.recording import Mounting, Recording
 from hecbench.rendering import RenderMesh
 from hecbench.robots.posed import PosedRobot
+from hecbench.samples.spread import evenly
 from hecbench.se3 import Array
 from hecbench_plugins.maskless import evidence
 from hecbench_plugins.maskless.ball import Ball
@@ -81,9 +82,7 @@ class Photographs:
             canvas = undistorted_canvas(recording, robot)
         except InputError as error:
             raise Refusal(str(error)) from error
-        search_views = canvas.subset(
-            np.unique(np.linspace(0, len(canvas) - 1, COURSE.search_views).round().astype(int))
-        )
+        search_views = canvas.subset(evenly(len(canvas), COURSE.search_views))
         fixed = recording.mounting is Mounting.EYE_TO_HAND and len(canvas) >= scene_background.FEWEST_VIEWS
         background = Background.of(canvas.images) if fixed else None
         return Photographs(robot, meshes_by_level(robot.model), canvas, search_views, background)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.estimate import Estimate, Termination
+from hecbench.samples.spread import evenly
 from hecbench.se3 import Array
 from hecbench_plugins.second_order.descent import Descent, Trace, draw_counted
 from hecbench_plugins.second_order.flatness import edge_excess
@@ -117,10 +118,9 @@ def _disagreement(end: FinalStage) -> Array:
 
 def path_json(steps: list[tuple[str, Array, float]]) -> list[list[Any]]:
     """Stage, cost and log of parent_T_camera of the steps, thinned to `EVIDENCE.path_steps`, first and last kept."""
-    kept = np.round(np.linspace(0, len(steps) - 1, min(EVIDENCE.path_steps, len(steps)))).astype(int)
     return [
         [stage, None if np.isnan(cost) else round(cost, 6), se3.log(se3.inverse(pose)).round(6).tolist()]
-        for stage, pose, cost in (steps[i] for i in kept)
+        for stage, pose, cost in (steps[i] for i in evenly(len(steps), EVIDENCE.path_steps))
     ]
 
 

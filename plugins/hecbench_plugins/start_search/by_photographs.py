@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from hecbench import se3
 from hecbench.rendering import Renderer, RenderMesh
 from hecbench.rendering.undistort import shrunk_intrinsics
+from hecbench.samples.spread import evenly
 from hecbench.se3 import Array
 from hecbench.system import threads
 from hecbench_plugins.start_search.kernels import coverage
@@ -50,7 +51,7 @@ def starts(
     centre = np.array([0.0, 0.0, 1.0])
     rotations = sphere.rotations()
     poses = np.concatenate([look_at(rotations, middle, centre, distance) for distance in distances_m])
-    views = np.unique(np.linspace(0, len(parent_T_link) - 1, PHOTOGRAPHS.views).round().astype(int))
+    views = evenly(len(parent_T_link), PHOTOGRAPHS.views)
     seen = K, valid, parent_T_link[views], foreground[views]
     _, costs = _shifted(meshes[0], seen, poses, PHOTOGRAPHS.coarse_px)
     better = np.sort(costs.argsort(kind="stable")[: max(count, round(PHOTOGRAPHS.better * len(poses)))])
