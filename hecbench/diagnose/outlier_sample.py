@@ -24,7 +24,8 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
         return None, case
     found, agreeing = case.agreed
     millimetres, degrees = found.displacements()
-    worst = float(np.sqrt(found.studentised(agreeing).max()))
+    studentised = found.studentised(agreeing)
+    worst = float(np.sqrt(studentised.max()))
     limit = float(np.sqrt(STANDS_OUT))
     odd = ~agreeing & ((millimetres > NOTICEABLE_MM) | (degrees > NOTICEABLE_DEG))
     odd &= ~np.isin(case.ids(np.arange(len(odd))), list(case.explained))
@@ -32,7 +33,7 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
         summary = f"the most different sample is {worst:.1f} times as far off as the typical one"
         severity = Severity.OK if worst <= limit else Severity.INFO
         if severity is Severity.INFO:
-            i = int(found.studentised(agreeing).argmax())
+            i = int(studentised.argmax())
             summary += f", by {millimetres[i]:.2g} mm and {degrees[i]:.2g} deg"
         return Finding(ID, severity, summary, value=worst, limit=limit), case
     moved = _moved_together(case, odd)
@@ -49,7 +50,7 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
     verb = "contradicts" if len(concerned) == 1 else "contradict"
     summary = f"{names(concerned)} {verb} the other samples: the target is displaced by {off}"
     action = "look at its image and robot pose; leave it out or record it again"
-    beyond_chance = found.studentised(agreeing) > found.exceeded(agreeing, CHANCE)
+    beyond_chance = studentised > found.exceeded(agreeing, CHANCE)
     far = odd & beyond_chance & ((millimetres > LIMIT_MM) | (degrees > LIMIT_DEG))
     severity = Severity.CRITICAL if far.any() else Severity.WARNING
     return Finding(ID, severity, summary, action, worst, limit, concerned), case
