@@ -9,12 +9,11 @@ from __future__ import annotations
 
 import argparse
 import json
-import subprocess
 import sys
 import time
-from datetime import UTC, datetime
 from pathlib import Path
 
+import figures_file
 import msgspec
 import numpy as np
 from hecbench_plugins.perception.card import ModelCard, read_network, write_card
@@ -24,12 +23,11 @@ from hecbench_plugins.regression.card import WORDS, RegressionCard
 from hecbench import registry, se3
 from hecbench.estimate import Status
 from hecbench.preparation import load_recording, prepare, segmented
+from hecbench.report.maskless import RIGHT_DEG, RIGHT_MM
 from hecbench.running import solving
 from hecbench.specs import Kind, SolverSpec
 from hecbench.statistics import bootstrap, wilson
 
-RIGHT_M, RIGHT_DEG = 0.03, 2.0
-"""A camera nearer than this to the truth is right."""
 HELD_MARGIN = 0.22
 """Of the board's extent, around board and flange: what a robot holds is not in its model."""
 
@@ -135,7 +133,7 @@ def cameras(recording, options):
 
 def camera_summary(rows):
     answered = [row for row in rows if row is not None]
-    right = sum(mm < 1e3 * RIGHT_M and deg < RIGHT_DEG for mm, deg in answered)
+    right = sum(mm < RIGHT_MM and deg < RIGHT_DEG for mm, deg in answered)
     rate = wilson(right, len(rows))
     found = {"n": len(rows), "answered": len(answered), "right": right}
     found["right_interval"] = [round(rate.low, 3), round(rate.high, 3)]
@@ -182,18 +180,8 @@ def main():
         given = f", masks {o.segmenter}, start {o.start[0]} m {o.start[1]} deg" if o.segmenter else ""
         name = f"cameras, {o.name}, {o.solver}, {o.views} views{given}"
         figures = camera_summary([row for recording in recordings for row in cameras(recording, o)])
-    commit = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=True
-    ).stdout
-    figures |= {
-        "command": " ".join(["python", "benchmarks/perception_figures.py", *sys.argv[1:]]),
-        "commit": commit.strip(),
-        "date": datetime.now(UTC).date().isoformat(),
-        "seed": o.seed,
-    }
-    known = json.loads(o.out.read_text()) if o.out.exists() else {}
-    o.out.parent.mkdir(parents=True, exist_ok=True)
-    o.out.write_text(json.dumps(known | {name: figures}, indent=1) + "\n")
+    figures |= {"command": figures_file.command(), **figures_file.version(), "seed": o.seed}
+    figures_file.replace(o.out, {name: figures})
     print(name, json.dumps(figures, indent=1))
     if o.card:
         kind, words = (

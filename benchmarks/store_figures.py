@@ -8,21 +8,17 @@ intervals, medians and means those of the bootstrap.
 
 from __future__ import annotations
 
-import json
-import subprocess
-from datetime import UTC, datetime
 from pathlib import Path
 
 import click
+import figures_file
 import numpy as np
 
 from hecbench import statistics
 from hecbench.estimate import Status
-from hecbench.report import scores
+from hecbench.report import maskless, scores
 from hecbench.storage import store, trial_record
 from hecbench.storage.trial_record import Outcome
-
-RIGHT_MM, RIGHT_DEG = 30.0, 2.0
 
 
 def rate(flags, of=None):
@@ -50,10 +46,10 @@ def spread(values):
 def of_runs(runs):
     """The figures of the runs of one solver on one level."""
     answered = scores.answered(runs)
-    right = [scores.within(run, RIGHT_MM, np.deg2rad(RIGHT_DEG)) for run in runs]
+    right = [maskless.outcome(run) is maskless.Outcome.RIGHT for run in answered]
     return {
         "answered": rate([run.status is Status.OK for run in runs]),
-        "right": rate(right),
+        "right": rate(right, len(runs)),
         "wrong": len(answered) - sum(right),
         "near": rate([scores.within(run, *scores.SUCCESSES[0]) for run in runs]),
         "base_in_camera_mm": spread([run.errors[scores.ERROR] for run in answered]),
@@ -102,11 +98,7 @@ def figures(folders, planned):
         key: sorted({str(source[key]) for source in sources if source.get(key) is not None})
         for key in ("command", "seed")
     }
-    commit = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=True
-    )
-    date = datetime.now(UTC).date().isoformat()
-    return {"figures": found, "from": {**said, "commit": commit.stdout.strip(), "date": date}}
+    return {"figures": found, "from": {**said, **figures_file.version()}}
 
 
 @click.command(help=__doc__.splitlines()[0])
@@ -117,8 +109,7 @@ def figures(folders, planned):
 @click.option("--out", required=True, type=click.Path(path_type=Path, dir_okay=False))
 @click.option("--planned", default=0, help="Trials of each task that were to be made.")
 def main(name, stores, out, planned):
-    known = json.loads(out.read_text()) if out.exists() else {}
-    out.write_text(json.dumps(known | {name: figures(stores, planned)}, indent=1) + "\n")
+    figures_file.replace(out, {name: figures(stores, planned)})
 
 
 if __name__ == "__main__":

@@ -7,12 +7,10 @@ over the pictures; IoU is that of what is not black.
 
 import argparse
 import json
-import subprocess
-import sys
-from datetime import UTC, datetime
 from pathlib import Path
 
 import cv2
+import figures_file
 import numpy as np
 
 from hecbench import registry, se3
@@ -76,10 +74,7 @@ def main():
     options.add_argument("--out", type=Path, required=True)
     o = options.parse_args()
     recordings = [load_recording(path) for path in o.recordings]
-    known = json.loads(o.out.read_text()) if o.out.exists() else {}
-    commit = subprocess.run(
-        ["git", "rev-parse", "--short", "HEAD"], capture_output=True, text=True, check=True
-    ).stdout
+    found, version = {}, figures_file.version()
     for name in o.translator:
         translate = registry.load().get(Kind.TRANSLATOR, name, TranslatorSpec).factory()
         values = np.array([line for recording in recordings for line in rows(recording, translate)])
@@ -88,18 +83,13 @@ def main():
             interval = bootstrap(numbers)
             figures[column] = [round(v, 4) for v in (interval.value, interval.low, interval.high)]
         shown, _, model = name.rstrip("]").partition("[model=")
-        figures |= {
-            "command": f"python benchmarks/translation_figures.py {' '.join(sys.argv[1:])}",
-            "commit": commit.strip(),
-            "date": datetime.now(UTC).date().isoformat(),
-        }
+        figures |= {"command": figures_file.command(), **version}
         if model:
             card = json.loads((Path(model) / "model.json").read_text())
             figures["trained"] = f"{card.get('size', '')} px, {card.get('steps', '')} steps"
-        known[f"{o.name}, {shown}"] = figures
+        found[f"{o.name}, {shown}"] = figures
         print(shown, {column: figures[column] for column in COLUMNS})
-    o.out.parent.mkdir(parents=True, exist_ok=True)
-    o.out.write_text(json.dumps(known, indent=1) + "\n")
+    figures_file.replace(o.out, found)
 
 
 if __name__ == "__main__":
