@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Protocol, TypeVar
 
 import click
 
@@ -15,6 +15,13 @@ from hecbench_plugins.translation.plan import Method
 _FOLDER = click.Path(path_type=Path, file_okay=False)
 _Decorator = Callable[[Callable[..., None]], Callable[..., None]]
 _NEEDED = ("torch", "safetensors", "onnx")
+
+
+class _Training(Protocol):
+    def run(self) -> None: ...
+
+
+_T = TypeVar("_T", bound=_Training)
 
 
 def _require_torch(*others: str) -> None:
@@ -96,14 +103,10 @@ def perception(
         backgrounds=backgrounds,
     )
     plan.check()
+    from hecbench_plugins.perception.product import write_model
     from hecbench_plugins.perception.training import Training
 
-    training = Training(plan, click.echo)
-    with _room_on_disk(out):
-        training.run()
-        from hecbench_plugins.perception.product import write_model
-
-        click.echo(f"{write_model(training)}: the model, its card and its curve")
+    _train(Training(plan, click.echo), write_model, out, "the model, its card and its curve")
 
 
 @train.command()
@@ -155,14 +158,10 @@ def regression(
         backgrounds=backgrounds,
     )
     plan.check()
+    from hecbench_plugins.regression.product import write_model
     from hecbench_plugins.regression.training import Training
 
-    training = Training(plan, click.echo)
-    with _room_on_disk(out):
-        training.run()
-        from hecbench_plugins.regression.product import write_model
-
-        click.echo(f"{write_model(training)}: the model, its card and its curve")
+    _train(Training(plan, click.echo), write_model, out, "the model, its card and its curve")
 
 
 @train.command()
@@ -190,18 +189,15 @@ def translation(
     plan.check()
     from hecbench_plugins.translation.training import Training, write_model
 
-    training = Training(plan, click.echo)
-    with _room_on_disk(out):
-        training.run()
-        click.echo(f"{write_model(training)}: the translator and its card")
+    _train(Training(plan, click.echo), write_model, out, "the translator and its card")
 
 
-@contextmanager
-def _room_on_disk(folder: Path) -> Iterator[None]:
-    """Say in one line that a folder cannot be written."""
+def _train(training: _T, write_model: Callable[[_T], Path], out: Path, written: str) -> None:
+    """Train to the end and write the model; say in one line that its folder cannot be written."""
     try:
-        yield
+        training.run()
+        click.echo(f"{write_model(training)}: {written}")
     except OSError as error:
         raise HecbenchError(
-            f"{folder}: cannot be written ({error.strerror}); make room and start again"
+            f"{out}: cannot be written ({error.strerror}); make room and start again"
         ) from error
