@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from hecbench.errors import InputError
 from hecbench.se3 import Array
 from hecbench_plugins.perception.card import ModelCard, read_card
+from hecbench_plugins.perception.graph import runnable
 from hecbench_plugins.perception.plan import STRIDE
 from hecbench_plugins.perception.settings import READING
 from hecbench_plugins.perception.shrinking import softened
@@ -101,12 +102,9 @@ class PerceptionModel:
     def __init__(self, folder: Path) -> None:
         self.card, weights = read_card(folder)
         path = folder / self.card.weights
-        try:
+        with runnable(path):
             self._net = cv2.dnn.readNetFromONNX(np.frombuffer(weights, np.uint8))
             answer = self._answer(np.zeros((2 * STRIDE, STRIDE, 3), np.uint8))
-        except cv2.error as error:
-            reason = " ".join(str(error).split())[-160:]
-            raise InputError(f"{path}: OpenCV cannot run this graph: {reason}") from None
         expected = (self.card.outputs, STRIDE, STRIDE // 2)
         if answer.shape != expected:
             raise InputError(

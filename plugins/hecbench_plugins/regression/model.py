@@ -14,6 +14,7 @@ from hecbench.errors import InputError
 from hecbench.lens import CameraModel
 from hecbench.se3 import Array
 from hecbench_plugins.perception.card import read_network
+from hecbench_plugins.perception.graph import runnable
 from hecbench_plugins.regression.answer import NUMBERS, decode
 from hecbench_plugins.regression.card import RegressionCard
 from hecbench_plugins.regression.reference import posture
@@ -34,12 +35,9 @@ class RegressionModel:
     def __init__(self, folder: Path) -> None:
         self.card, weights = read_network(folder, RegressionCard)
         path, size = folder / self.card.weights, self.card.size
-        try:
+        with runnable(path):
             self._net = cv2.dnn.readNetFromONNX(np.frombuffer(weights, np.uint8))
             answer = self._answer(np.zeros((size, size, 3), np.uint8), np.zeros(len(self.card.joints)))
-        except cv2.error as error:
-            reason = " ".join(str(error).split())[-160:]
-            raise InputError(f"{path}: OpenCV cannot run this graph: {reason}") from None
         if answer.shape != (NUMBERS + 1,):
             raise InputError(
                 f"{path}: the graph answers {answer.shape}, {NUMBERS + 1} numbers are wanted: train the model again"

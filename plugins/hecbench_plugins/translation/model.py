@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from hecbench.errors import InputError
 from hecbench.system import files
+from hecbench_plugins.perception.graph import runnable
 
 Picture = NDArray[np.float32]
 
@@ -51,11 +52,8 @@ class TrainedTranslator:
         graph = files.read_bytes(folder / WEIGHTS)
         if hashlib.sha256(graph).hexdigest() != self.card.sha256:
             raise InputError(f"{folder / WEIGHTS}: not the file that {CARD} describes: train it again")
-        try:
+        with runnable(folder / WEIGHTS):
             self._net = cv2.dnn.readNetFromONNX(np.frombuffer(graph, np.uint8))
-        except cv2.error as error:
-            reason = " ".join(str(error).split())[-160:]
-            raise InputError(f"{folder / WEIGHTS}: OpenCV cannot run this graph: {reason}") from None
 
     def __call__(
         self, image: Picture, mask: Picture, *, part: NDArray[np.int32], colours: NDArray[np.float64]
