@@ -6,7 +6,7 @@ from hecbench_plugins.perception.card import NetworkCard
 from hecbench_plugins.perception.card_text import Words
 from hecbench_plugins.perception.skeleton import Keypoint
 
-WEIGHTS, FORMAT = "regression.onnx", 1
+WEIGHTS = "regression.onnx"
 
 
 class RegressionCard(NetworkCard, frozen=True, kw_only=True):

@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 from hecbench import se3
 from hecbench.lens import CameraModel
 from hecbench.system import files
-from hecbench_plugins.perception.card import write_card
+from hecbench_plugins.perception.card import FORMAT, write_card
 from hecbench_plugins.perception.card_text import write_page
 from hecbench_plugins.perception.pictures import PictureMaker
 from hecbench_plugins.perception.product import SAMPLE_SEED, SAMPLES, facts, write_curve, write_picture
-from hecbench_plugins.regression.card import FORMAT, WEIGHTS, WORDS, RegressionCard
+from hecbench_plugins.regression.card import WEIGHTS, WORDS, RegressionCard
 from hecbench_plugins.regression.model import RegressionModel
 from hecbench_plugins.regression.onnx_export import to_onnx
 from hecbench_plugins.regression.plan import CROP_PX
