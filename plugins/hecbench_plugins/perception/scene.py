@@ -11,6 +11,7 @@ from hecbench import se3
 from hecbench.rendering import Renderer
 from hecbench.se3 import Array
 from hecbench_plugins.perception.family import Arm
+from hecbench_plugins.perception.skeleton import LINK_RADIUS_M
 
 Rng = np.random.Generator
 
@@ -31,8 +32,6 @@ USUAL, USUAL_DEG, ALL_DEG = 0.85, (-15.0, 65.0), (-30.0, 85.0)
 """Of the camera's elevation: the share of usual ones, their range, and that of the others."""
 _SHARE = (0.3, 1.3)
 """The robot's extent as a share of the picture's side, on a logarithmic scale: beyond 1 it leaves the picture."""
-_MARGIN_M = 0.06
-"""About the radius of a link: keypoints are middles."""
 _LEAST_COVER = 0.01
 """Of the picture, by the robot; smaller robots are drawn again."""
 
@@ -128,7 +127,7 @@ def random_camera(points: Array, size: int, rng: Rng) -> tuple[Array, Array]:
     camera_T_base = se3.make(R, -R @ eye)
     p = points @ R.T + camera_T_base[:3, 3]
     low, high = (p[:, :2] / p[:, 2:]).min(0), (p[:, :2] / p[:, 2:]).max(0)
-    low, high = low - _MARGIN_M / distance, high + _MARGIN_M / distance
+    low, high = low - LINK_RADIUS_M / distance, high + LINK_RADIUS_M / distance
     focal = size * np.exp(rng.uniform(*np.log(_SHARE))) / (high - low).max()
     place = rng.uniform(-0.08, 1.08, 2) if rng.random() < 0.6 else np.full(2, 0.5)
     corner = place * (size - focal * (high - low))

@@ -15,6 +15,8 @@ from hecbench.se3 import Array
 
 _SAME_POINT_M = 0.03
 """A link's points nearer than this are one."""
+LINK_RADIUS_M = 0.06
+"""About the radius of a link around its keypoints, which are middles."""
 
 
 @dataclass(frozen=True)

@@ -15,12 +15,16 @@ from torch import Tensor
 
 from hecbench_plugins.perception.family import Arm
 from hecbench_plugins.perception.scene import (
+    ALL_DEG,
     APART_M,
     DISTANCE_M,
     LOWEST_M,
     TAUGHT,
     TAUGHT_NOISE_RAD,
+    USUAL,
+    USUAL_DEG,
 )
+from hecbench_plugins.perception.skeleton import LINK_RADIUS_M
 from hecbench_plugins.regression.kinematics import Kinematics
 from hecbench_plugins.regression.losses import losses
 from hecbench_plugins.regression.network import Dense
@@ -39,8 +43,6 @@ _SHARP, _BLURRED, _BLURRED_FROM = 0.17, 0.34, 0.12
 spreads are, on 192 drawn pictures with the shipped perception network."""
 _FREEDOM = 4
 """Of the t distribution of errors: some are large."""
-_HALF_WIDTH_M = 0.06
-"""Of a link, around the keypoints."""
 
 Floats = NDArray[np.float64]
 
@@ -103,9 +105,8 @@ class Sketches:
         reach = np.linalg.norm(points - middle[:, None], axis=2).max(1)
         distance = reach + _even_logarithm(DISTANCE_M, n, rng)
         azimuth = rng.uniform(-np.pi, np.pi, n)
-        elevation = np.deg2rad(
-            np.where(rng.random(n) < 0.85, rng.uniform(-15, 65, n), rng.uniform(-30, 85, n))
-        )
+        usual = rng.random(n) < USUAL
+        elevation = np.deg2rad(np.where(usual, rng.uniform(*USUAL_DEG, n), rng.uniform(*ALL_DEG, n)))
         level = np.cos(elevation) * np.array([np.cos(azimuth), np.sin(azimuth)])
         eye = middle + distance[:, None] * np.stack([*level, np.sin(elevation)], 1)
         share = _even_logarithm(SHARE, n, rng)
@@ -117,7 +118,7 @@ class Sketches:
         x, y = np.cos(roll) * right + np.sin(roll) * down, np.cos(roll) * down - np.sin(roll) * right
         R = np.stack([x, y, forward], 1)
         p = (points - eye[:, None]) @ R.swapaxes(1, 2)
-        ends = _HALF_WIDTH_M / p[..., 2:]
+        ends = LINK_RADIUS_M / p[..., 2:]
         flat = p[..., :2] / p[..., 2:]
         extent = ((flat + ends).max(1) - (flat - ends).min(1)).max(1)
         return R, eye, share / extent

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from hecbench.lens import CameraModel, distort
 from hecbench.se3 import Array
 from hecbench_plugins.perception.shrinking import softened
+from hecbench_plugins.perception.skeleton import LINK_RADIUS_M
 
 Bytes = NDArray[np.uint8]
 
@@ -22,8 +23,6 @@ _FOCAL = (0.3, 20.0)
 """Least and largest focal length of a virtual camera, as a share of its side: 118 to 3 degrees."""
 _FOREMOST = 0.05
 """A ray's least z (of a unit ray): what lies farther to the side is not in any picture."""
-_MARGIN_M = 0.06
-"""About the radius of a link around the keypoints, which are middles."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +66,7 @@ class VirtualCamera:
         for last in (False, True):
             p = points @ R
             p[:, 2] = np.maximum(p[:, 2], _FOREMOST)
-            reach = _MARGIN_M / p[:, 2:]
+            reach = LINK_RADIUS_M / p[:, 2:]
             low, high = (p[:, :2] / p[:, 2:] - reach).min(0), (p[:, :2] / p[:, 2:] + reach).max(0)
             focal = float(np.clip(share / (high - low).max(), *_FOCAL))
             off = (low + high) / 2 - (np.asarray(aside, float) / focal if last else 0.0)
