@@ -121,9 +121,8 @@ class Rectification:
 
 def _shrunk_size(shape: Sequence[int], by: int) -> tuple[int, int]:
     """(H, W), whole multiples of the grid."""
-    return shape[0] // by // CANVAS.grid_px * CANVAS.grid_px, shape[
-        1
-    ] // by // CANVAS.grid_px * CANVAS.grid_px
+    grid = CANVAS.grid_px
+    return shape[0] // by // grid * grid, shape[1] // by // grid * grid
 
 
 def undistorted_canvas(recording: Recording, robot: PosedRobot) -> Canvas:
