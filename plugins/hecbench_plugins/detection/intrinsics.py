@@ -31,6 +31,8 @@ LENSES = (
     ("k1", "k2", "p1", "p2", "k3"),
 )
 """The lens models, by the terms that are free, from the poorest to the richest."""
+FEW_VIEWS_LENS = LENSES[1]
+"""Of fewer views than can be left out in turn."""
 
 Views = list[tuple[NDArray[np.float32], NDArray[np.float32]]]
 """Points (P, 3) m and corners (P, 2) px of each view."""
@@ -150,7 +152,7 @@ def _same(corners: Array, other: Array) -> bool:
 def _lens(views: Views, size: tuple[int, int]) -> tuple[str, ...]:
     """The richest lens that predicts left-out views as well as any, and is known up to the corners."""
     if len(views) < INTRINSICS.folds:
-        return INTRINSICS.few_views_lens
+        return FEW_VIEWS_LENS
     compared = [views[i] for i in evenly(len(views), INTRINSICS.most_compared)]
     errors = [float(_predicted(compared, size, lens).mean()) for lens in LENSES]
     good = [

@@ -111,7 +111,6 @@ class IntrinsicsSettings:
         as_well: mean squared error of prediction over that of the best lens.
         corner_share: standard deviation of what the last radial term moves a point in the picture's corner, over its
             distance from the middle.
-        few_views_lens: the terms of the lens of fewer views than can be left out in turn.
         folds: of the views, left out in turn.
         most_compared: views that the lens models are compared on.
         most_uncertain, most_uncertain_centre: standard deviations beyond which the views are said to leave a parameter
@@ -124,7 +123,6 @@ class IntrinsicsSettings:
     least_points: int = 6
     as_well: float = 1.05
     corner_share: float = 0.01
-    few_views_lens: tuple[str, ...] = ("k1",)
     folds: int = 5
     most_compared: int = 20
     most_uncertain: float = 0.1
