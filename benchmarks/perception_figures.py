@@ -11,6 +11,7 @@ import argparse
 import json
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import figures_file
@@ -107,28 +108,41 @@ def away(truth, metres, degrees, rng):
     return moved
 
 
-def cameras(recording, options):
+def cameras(recording, name, options):
     """Errors in mm and deg of each draw of some views; None where there is no answer."""
-    from dataclasses import replace
-
-    spec = registry.load().get(Kind.SOLVER, options.solver, SolverSpec)
-    rows = []
+    known = {}
+    if options.keep and options.keep.exists():
+        lines = map(json.loads, options.keep.read_text().splitlines())
+        known = {line["draw"]: line["row"] for line in lines if line["of"] == [name, recording.name]}
     for draw in range(options.draws):
-        rng = np.random.default_rng((options.seed, draw))
-        views = np.sort(rng.permutation(len(recording))[: options.views])
-        start = away(recording.truth_parent_T_camera, options.start[0], options.start[1], rng)
-        part = replace(recording.subset(views), initial_parent_T_camera=start, corners_px=None, target=None)
-        settings = solving.Options(seed=draw, segmenter=options.segmenter)
-        estimate = next(iter(solving.solve(part, [spec], settings)))
-        if estimate.status is not Status.OK:
-            print(f"{recording.name} draw {draw}: {estimate.status} {estimate.reason}", file=sys.stderr)
-            rows.append(None)
-            continue
-        T, truth = estimate.parent_T_camera, recording.truth_parent_T_camera
-        mm = 1e3 * float(se3.translation_error_m(truth, T))
-        rows.append((mm, float(np.rad2deg(se3.rotation_error_rad(truth, T)))))
-        print(f"{recording.name} draw {draw}: {rows[-1][0]:.1f} mm {rows[-1][1]:.2f} deg", file=sys.stderr)
-    return rows
+        if draw not in known:
+            known[draw] = camera(recording, draw, options)
+            if options.keep:
+                line = json.dumps({"of": [name, recording.name], "draw": draw, "row": known[draw]})
+                with options.keep.open("a") as kept:
+                    kept.write(line + "\n")
+    return [known[draw] for draw in range(options.draws)]
+
+
+def camera(recording, draw, options):
+    """Errors in mm and deg from views and a start that are drawn; None where there is no answer."""
+    spec = registry.load().get(Kind.SOLVER, options.solver, SolverSpec)
+    rng = np.random.default_rng((options.seed, draw))
+    views = np.sort(rng.permutation(len(recording))[: options.views])
+    start = away(recording.truth_parent_T_camera, options.start[0], options.start[1], rng)
+    part = replace(recording.subset(views), initial_parent_T_camera=start, corners_px=None, target=None)
+    settings = solving.Options(seed=draw, segmenter=options.segmenter)
+    estimate = next(iter(solving.solve(part, [spec], settings)))
+    if estimate.status is not Status.OK:
+        print(f"{recording.name} draw {draw}: {estimate.status} {estimate.reason}", file=sys.stderr)
+        return None
+    T, truth = estimate.parent_T_camera, recording.truth_parent_T_camera
+    mm = 1e3 * float(se3.translation_error_m(truth, T))
+    deg = float(np.rad2deg(se3.rotation_error_rad(truth, T)))
+    print(
+        f"{recording.name} draw {draw}: {mm:.1f} mm {deg:.2f} deg, {estimate.seconds:.0f} s", file=sys.stderr
+    )
+    return mm, deg
 
 
 def camera_summary(rows):
@@ -160,6 +174,9 @@ def main():
     options.add_argument("--draws", type=int, default=20, help="of each recording")
     options.add_argument("--start", type=float, nargs=2, default=(0.1, 8.0), metavar=("M", "DEG"))
     options.add_argument("--seed", type=int, default=0)
+    options.add_argument(
+        "--keep", type=Path, help="a line for each camera; what stands there is not run again"
+    )
     options.add_argument("--card", type=Path, help="folder of the network, whose card gets the figures, too")
     o = options.parse_args()
     recordings = [load_recording(path) for path in o.recordings] or laboratory(o.lab)
@@ -179,7 +196,7 @@ def main():
             o.segmenter = None
         given = f", masks {o.segmenter}, start {o.start[0]} m {o.start[1]} deg" if o.segmenter else ""
         name = f"cameras, {o.name}, {o.solver}, {o.views} views{given}"
-        figures = camera_summary([row for recording in recordings for row in cameras(recording, o)])
+        figures = camera_summary([row for recording in recordings for row in cameras(recording, name, o)])
     figures |= {"command": figures_file.command(), **figures_file.version(), "seed": o.seed}
     figures_file.replace(o.out, {name: figures})
     print(name, json.dumps(figures, indent=1))

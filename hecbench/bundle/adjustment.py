@@ -96,8 +96,9 @@ def adjust(problem: Problem, state: State, noise: Noise, settings: DescentSettin
     while iterations < settings.iterations and termination is Termination.MAX_ITERATIONS:
         iterations += 1
         shared, robot = _step(at, noise, damping)
-        candidate = state.moved(shared, robot)
-        there = linearise(problem, candidate, noise)
+        with np.errstate(all="ignore"):  # a step that is far too large has no finite cost, and is taken back
+            candidate = state.moved(shared, robot)
+            there = linearise(problem, candidate, noise)
         if there.cost <= at.cost:
             small = at.cost - there.cost <= settings.least_fall * at.cost or (
                 max(np.abs(shared).max(), np.abs(robot).max()) < settings.least_step

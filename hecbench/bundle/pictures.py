@@ -61,7 +61,7 @@ def linearised(
     costs = (residuals**2).sum((1, 2))
     costs[(behind.reshape(seen.shape) & seen).any(1)] = np.inf
     by_point = by_point.reshape(*shape, 3) * seen[..., None, None]
-    by_pose = np.concatenate([-by_point @ se3.hat(points_c), by_point], -1)
+    by_pose = np.concatenate([np.cross(points_c[:, :, None], by_point), by_point], -1)
     by_shared = by_parameter.reshape(*shape, len(parameters)) * seen[..., None, None]
     return Normals(
         residuals, costs, by_pose.reshape(*rows, 6), by_shared.reshape(*rows, len(parameters)), points_c
