@@ -63,6 +63,13 @@ def perceiver_by_option(model: str | None) -> Perceiver:
     return by_folder(Path(model))
 
 
+def installed_folder(name: str) -> Path | None:
+    """Where an installed network of this name lies; None when there is none, or it is no `PerceptionModel`."""
+    known = {spec.name for spec in registry.load().ready(Kind.PERCEPTION, PerceptionSpec)}
+    perceiver = _by_name(name) if name in known else None
+    return perceiver.folder if isinstance(perceiver, PerceptionModel) else None
+
+
 @lru_cache(maxsize=4)
 def _by_name(name: str) -> Perceiver:
     return registry.load().get(Kind.PERCEPTION, name, PerceptionSpec).factory()

@@ -67,7 +67,15 @@ def train() -> None:
 @click.option("--size", default=192, show_default=True, help="Side of the drawn pictures, px.")
 @click.option("--batch", default=8, show_default=True, help="Pictures per step.")
 @click.option(
-    "--start-from", type=click.Path(path_type=Path, dir_okay=False), help="A checkpoint to start from."
+    "--start-from",
+    type=click.Path(path_type=Path),
+    help="A checkpoint, or the folder or name of a perception model.",
+)
+@click.option(
+    "--adapt",
+    multiple=True,
+    type=click.Path(path_type=Path),
+    help="A recording of your own cell, without labels: a quarter of the pictures are its photographs. Repeatable.",
 )
 @_drawing
 @_run
@@ -81,11 +89,13 @@ def perception(
     batch: int,
     threads: int,
     start_from: Path | None,
+    adapt: tuple[Path, ...],
     backgrounds: Path | None,
 ) -> None:
     """Train the network that finds robots in photographs, and write it as OUT/model.
 
-    The run needs no data. It may be stopped at any moment: the same command goes on from its last checkpoint.
+    The run needs no data. With --adapt, the camera that a recording's photographs confirm, with the robot's model, says
+    what they show. The run may be stopped at any moment: the same command goes on from its last checkpoint.
     """
     _require_torch()
     from hecbench_plugins.perception.plan import Plan
@@ -99,8 +109,9 @@ def perception(
         size=size,
         batch=batch,
         threads=threads,
-        start_from=start_from,
+        start_from=start_from and _start(start_from),
         backgrounds=backgrounds,
+        adapt=adapt,
     )
     plan.check()
     from hecbench_plugins.perception.product import write_model
@@ -122,7 +133,7 @@ def perception(
 @click.option(
     "--start-from",
     type=click.Path(path_type=Path),
-    help="A checkpoint, or the folder of a perception model that has learned to see the robot.",
+    help="A checkpoint, or the folder or name of a perception model that has learned to see the robot.",
 )
 @_drawing
 @_run
@@ -154,7 +165,7 @@ def regression(
         batch=batch,
         sketches=sketches,
         threads=threads,
-        start_from=start_from,
+        start_from=start_from and _start(start_from),
         backgrounds=backgrounds,
     )
     plan.check()
@@ -190,6 +201,13 @@ def translation(
     from hecbench_plugins.translation.training import Training, write_model
 
     _train(Training(plan, click.echo), write_model, out, "the translator and its card")
+
+
+def _start(given: Path) -> Path:
+    """A path, or the folder of the installed network of this name."""
+    from hecbench_plugins.perception.choice import installed_folder
+
+    return given if given.exists() else installed_folder(str(given)) or given
 
 
 def _train(training: _T, write_model: Callable[[_T], Path], out: Path, written: str) -> None:

@@ -32,18 +32,22 @@ class Losses(NamedTuple):
         return self.colour + self.visible + _OVERLAP * self.overlap + _KEYPOINTS * self.keypoints
 
 
-def losses(logits: Tensor, shares: Tensor, points: Tensor) -> Losses:
+def losses(logits: Tensor, shares: Tensor, points: Tensor, visible_known: Tensor) -> Losses:
     """The terms for logits (B, C + 1 + K, h, w), shares (B, C + 1, h, w) in [0, 1], and points (B, K, 2) in cells.
 
-    Points that are NaN or outside are asked to be nowhere: an even heatmap.
+    Points that are NaN or outside are asked to be nowhere: an even heatmap. What is visible counts in the pictures (B,)
+    where it is known.
     """
     classes = shares.shape[1] - 1
     log_share = F.log_softmax(logits[:, :classes], 1)
     robot, visible = 1 - shares[:, 0], shares[:, classes]
     weight = 1 + _ROBOT_WEIGHT * robot + _EDGE_WEIGHT * _edges(robot)
     colour = -((log_share * shares[:, :classes]).sum(1) * weight).mean()
-    seen = F.binary_cross_entropy_with_logits(logits[:, classes], visible, weight=weight)
-    overlap = _dice(1 - log_share[:, 0].exp(), robot) + _dice(logits[:, classes].sigmoid(), visible)
+    known = visible_known.float()
+    crossed = F.binary_cross_entropy_with_logits(logits[:, classes], visible, weight=weight, reduction="none")
+    seen = _mean(crossed.mean((1, 2)), known)
+    overlap = _dice(1 - log_share[:, 0].exp(), robot).mean()
+    overlap = overlap + _mean(_dice(logits[:, classes].sigmoid(), visible), known)
     return Losses(colour, seen, overlap, _keypoints(logits[:, classes + 1 :], points))
 
 
@@ -56,10 +60,15 @@ def _edges(robot: Tensor) -> Tensor:
 
 
 def _dice(found: Tensor, wanted: Tensor) -> Tensor:
-    """1 - 2 |A and B| / (|A| + |B|) of shares (B, h, w), mean over the batch."""
+    """1 - 2 |A and B| / (|A| + |B|) (B,) of shares (B, h, w)."""
     both = (found * wanted).sum((1, 2))
     each = found.sum((1, 2)) + wanted.sum((1, 2))
-    return (1 - (2 * both + _OVERLAP_SOFTENING) / (each + _OVERLAP_SOFTENING)).mean()
+    return 1 - (2 * both + _OVERLAP_SOFTENING) / (each + _OVERLAP_SOFTENING)
+
+
+def _mean(values: Tensor, weights: Tensor) -> Tensor:
+    """Of values (B,) with weights (B,); 0 where all weights are."""
+    return (values * weights).sum() / weights.sum().clamp(min=1)
 
 
 def _keypoints(heat: Tensor, points: Tensor) -> Tensor:

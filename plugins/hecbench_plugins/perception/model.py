@@ -100,6 +100,7 @@ class PerceptionModel:
     """
 
     def __init__(self, folder: Path) -> None:
+        self.folder = folder
         self.card, weights = read_card(folder)
         path = folder / self.card.weights
         with runnable(path):

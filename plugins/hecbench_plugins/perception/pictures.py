@@ -57,13 +57,15 @@ class Example:
         shares: (S/2, S/2, 2 + C): shares of area, of 255, of the background and the C colour classes of the whole
             robot as if nothing hid it, and last of the visible robot.
         keypoints: (K, 2) px of the image, NaN behind the camera.
-        truth: None in a picture without a robot.
+        truth: None in a picture without a robot, and in a photograph.
+        visible_known: whether the last of the shares is to be learned.
     """
 
     image: Bytes
     shares: Bytes
     keypoints: Floats
     truth: Truth | None = None
+    visible_known: bool = True
 
 
 class PictureMaker:
@@ -179,8 +181,12 @@ class PictureMaker:
         truth: Truth | None = None,
     ) -> Example:
         small = cv2.resize(picture, (self.size, self.size), interpolation=cv2.INTER_AREA)
-        layers = [classes == c for c in range(len(self.family.palette))] + [visible]
-        half = (self.size // 2, self.size // 2)
-        shares = [cv2.resize(m.astype(np.float32), half, interpolation=cv2.INTER_AREA) for m in layers]
-        image = photographed(np.maximum(small, 0), self.rng)
-        return Example(image, np.rint(np.stack(shares, -1) * 255).astype(np.uint8), points, truth)
+        shares = shares_of(classes, visible, len(self.family.palette), self.size // 2)
+        return Example(photographed(np.maximum(small, 0), self.rng), shares, points, truth)
+
+
+def shares_of(classes: Bytes, visible: NDArray[np.bool_], count: int, side: int) -> Bytes:
+    """Shares of area (side, side, count + 1), of 255: of each of `count` classes (H, H), and of the visible robot."""
+    layers = [classes == c for c in range(count)] + [visible]
+    shares = [cv2.resize(m.astype(np.float32), (side, side), interpolation=cv2.INTER_AREA) for m in layers]
+    return np.asarray(np.rint(np.stack(shares, -1) * 255), np.uint8)

@@ -23,8 +23,9 @@ class Plan:
         size: px of the drawn pictures, a multiple of 32.
         pictures_per_step: drawn anew.
         capacity: pictures that are kept.
-        start_from: a checkpoint whose averaged weights are the start.
+        start_from: a checkpoint whose averaged weights are the start, or the folder of a model.
         backgrounds: a folder of photographs without a robot.
+        adapt: recordings of one's own cell, whose photographs are among the pictures.
     """
 
     robots: tuple[str, ...]
@@ -40,6 +41,7 @@ class Plan:
     threads: int = 1
     start_from: Path | None = None
     backgrounds: Path | None = None
+    adapt: tuple[Path, ...] = ()
 
     def check(self) -> None:
         """Refuse what cannot be run.
@@ -60,4 +62,8 @@ class Plan:
         settings = (
             f"{self.size} px, batch {self.batch}, rate {self.rate:g}, {self.hours:g} h, seed {self.seed}"
         )
-        return settings + (f", started from {self.start_from.name}" if self.start_from else "")
+        if self.start_from:
+            settings += f", started from {self.start_from.name}"
+        if self.adapt:
+            settings += f", adapted to {', '.join(path.name for path in self.adapt)}"
+        return settings

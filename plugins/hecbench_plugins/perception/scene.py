@@ -63,10 +63,14 @@ class Scene:
 
     def keypoint_pixels(self) -> NDArray[np.float32]:
         """(K, 2) px of the picture; NaN behind the camera."""
-        p = se3.transform_points(self.camera_T_base, self.arm.keypoint_positions(self.base_T_link))
-        with np.errstate(all="ignore"):
-            pixels = p[:, :2] / p[:, 2:] * [self.K[0, 0], self.K[1, 1]] + self.K[:2, 2]
-        return np.where(p[:, 2:] > 0, pixels, np.nan).astype(np.float32)
+        return pixels_of(self.arm.keypoint_positions(self.camera_T_link), self.K)
+
+
+def pixels_of(points_c: Array, K: Array) -> NDArray[np.float32]:
+    """(N, 2) px of points (N, 3) m in the camera's frame, without a lens; NaN behind the camera."""
+    with np.errstate(all="ignore"):
+        pixels = points_c[:, :2] / points_c[:, 2:] * [K[0, 0], K[1, 1]] + K[:2, 2]
+    return np.where(points_c[:, 2:] > 0, pixels, np.nan).astype(np.float32)
 
 
 def supersampled(K: Array) -> Array:

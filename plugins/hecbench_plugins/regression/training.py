@@ -12,12 +12,12 @@ from torch import Tensor
 from hecbench_plugins.perception import checkpoint
 from hecbench_plugins.perception.exposure import exposed
 from hecbench_plugins.perception.run import Run
+from hecbench_plugins.perception.transfer import take_sight
 from hecbench_plugins.regression.losses import Losses, losses
 from hecbench_plugins.regression.network import RegressionNet
 from hecbench_plugins.regression.plan import Plan
 from hecbench_plugins.regression.shots import Shots
 from hecbench_plugins.regression.sketches import Sketches, fit_dense
-from hecbench_plugins.regression.transfer import take_sight
 
 _FIRST_PICTURES = 256
 

@@ -46,10 +46,26 @@ def test_losses_are_least_for_the_truth():
     right[:, 3] = -((torch.arange(8.0)[None] - 3) ** 2 + (torch.arange(8.0)[:, None] - 4) ** 2)
     right[:, 4] = 0.0
     wrong = right.roll(2, 3)
-    for ours, theirs in zip(losses(right, shares, points), losses(wrong, shares, points), strict=True):
+    known = torch.tensor([True])
+    for ours, theirs in zip(
+        losses(right, shares, points, known), losses(wrong, shares, points, known), strict=True
+    ):
         assert torch.isfinite(ours)
         assert ours < theirs or torch.equal(ours, theirs)
-    assert losses(right, shares, points).total() < losses(wrong, shares, points).total()
+    assert losses(right, shares, points, known).total() < losses(wrong, shares, points, known).total()
+
+
+def test_what_is_visible_counts_where_it_is_known():
+    shares, points = torch.rand(2, 3, 8, 8), torch.rand(2, 2, 2)
+    logits = torch.randn(2, 5, 8, 8)
+    other = logits.clone()
+    other[1, 2] += 3
+    half = torch.tensor([True, False])
+    assert losses(logits, shares, points, half).visible == losses(other, shares, points, half).visible
+    assert losses(logits, shares, points, ~half).visible != losses(other, shares, points, ~half).visible
+    first = losses(logits[:1], shares[:1], points[:1], torch.tensor([True]))
+    assert torch.isclose(losses(logits, shares, points, half).visible, first.visible)
+    assert losses(logits, shares, points, half & ~half).visible == 0
 
 
 def test_a_run_writes_a_model_that_opencv_runs(run):
@@ -103,10 +119,10 @@ def test_it_learns(crane, tmp_path):
 
     def total(net, seed):
         torch.manual_seed(seed)
-        images, shares, points = training._batch()
+        images, *wanted = training._batch()
         net.train()
         with torch.no_grad():
-            return float(sum(losses(net(images), shares, points)[:3]))
+            return float(sum(losses(net(images), *wanted)[:3]))
 
     before, after = ([total(net, seed) for seed in range(5)] for net in (first.net, training.net))
     assert np.mean(after) < 0.9 * np.mean(before)
