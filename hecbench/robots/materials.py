@@ -22,10 +22,14 @@ _LFS = b"version https://git-lfs"
 
 @dataclass(frozen=True)
 class Material:
-    """The diffuse colour, RGB in [0, 1], and the texture that stands in its place."""
+    """The diffuse colour, RGB in [0, 1], and the texture, a file or its content, that stands in its place.
+
+    `tint` multiplies the texture.
+    """
 
     colour: Colour | None = None
-    texture: Path | None = None
+    texture: Path | bytes | None = None
+    tint: Colour = (1.0, 1.0, 1.0)
 
 
 def mesh_bytes(path: Path) -> bytes:
@@ -34,29 +38,6 @@ def mesh_bytes(path: Path) -> bytes:
     if content.startswith(_LFS):
         raise InputError(f"{path}: is a Git LFS pointer, not a mesh: run git lfs pull")
     return content
-
-
-def referenced_files(mesh: Path) -> list[Path]:
-    """The files that decide a mesh's colours and lie beside or below it: material files and textures."""
-    suffix = mesh.suffix.lower()
-    if suffix == ".obj":
-        libraries = [
-            path
-            for path in map(mesh.parent.joinpath, libraries_of(mesh_bytes(mesh).decode("utf-8", "replace")))
-            if _is_below(path, mesh)
-        ]
-        found = {*libraries, *(m.texture for path in libraries for m in of_mtl(path).values() if m.texture)}
-    elif suffix == ".dae":
-        root = xml.parse(mesh_bytes(mesh), f"{mesh}: not a readable mesh", mesh=True)
-        found = {material.texture for material in of_collada(root, mesh).values() if material.texture}
-    else:
-        return []
-    return sorted(path for path in found if _is_below(path, mesh))
-
-
-def _is_below(path: Path, mesh: Path) -> bool:
-    folders = {mesh.parent.resolve(), mesh.resolve().parent}
-    return path.is_file() and any(path.resolve().is_relative_to(folder) for folder in folders)
 
 
 def _text(path: Path) -> str:
@@ -137,18 +118,22 @@ def _colour(text: str) -> Colour | None:
 
 
 def textured(
-    path: Path, uv: NDArray[np.float64] | None, faces: NDArray[np.int64], vertices: NDArray[np.float64]
+    texture: Path | bytes,
+    uv: NDArray[np.float64] | None,
+    faces: NDArray[np.int64],
+    vertices: NDArray[np.float64],
 ) -> tuple[Colour | None, str | None]:
     """The mean colour of a texture over the faces (F, 3) that wear it, by area; or why there is none.
 
     Args:
-        path: the texture.
+        texture: a file, or its content.
         uv: (V, 2) texture coordinates, v upwards; None: the mean of the whole picture.
         faces: vertices of the triangles.
         vertices: (V, 3) m.
     """
     try:
-        picture = pictures.image(path, str(path)).astype(float) / 255
+        where = str(texture) if isinstance(texture, Path) else "the picture inside the file"
+        picture = pictures.image(texture, where).astype(float) / 255
     except InputError as error:
         return None, str(error)
     if uv is None or len(uv) != len(vertices):

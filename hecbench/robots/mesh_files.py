@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench.errors import InputError
-from hecbench.robots import collada_files, materials
+from hecbench.robots import collada_files, gltf_files, materials
 from hecbench.robots.materials import Colour, Material
 from hecbench.robots.pieces import Piece, checked, labelled, piece
 
@@ -28,7 +28,7 @@ def read(path: Path) -> tuple[list[Piece], list[str]]:
     """
     content = materials.mesh_bytes(path)
     notes: list[str] = []
-    loaders = {".dae": collada_files.read, ".obj": _wavefront}
+    loaders = {".dae": collada_files.read, ".obj": _wavefront, ".gltf": _gltf, ".glb": _gltf}
     try:
         pieces = loaders.get(path.suffix.lower(), _other)(content, path, notes)
     except InputError:
@@ -64,6 +64,18 @@ def _wavefront(content: bytes, path: Path, notes: list[str]) -> list[Piece]:
     plain = "\n".join(["mtllib own", *lines]).encode()
     pieces = _other(plain, path, notes, resolver=_Library(grey), described=described)
     return checked(path, expected, pieces)
+
+
+def _gltf(content: bytes, path: Path, notes: list[str]) -> list[Piece]:
+    """glTF: its faces by trimesh, its materials here."""
+    from trimesh.resolvers import FilePathResolver
+
+    document = gltf_files.Document.of(content, path)
+    expected, plain = document.least_faces(), document.plain()
+    pieces = _other(
+        plain, path, notes, resolver=FilePathResolver(str(path)), described=document.materials(notes)
+    )
+    return pieces if sum(len(piece.faces) for piece in pieces) > expected else checked(path, expected, pieces)
 
 
 def _counted_from_the_first(lines: list[str]) -> list[str]:
@@ -113,8 +125,8 @@ def _other(
     import trimesh
 
     suffix = path.suffix.lower().lstrip(".")
-    if resolver is None and suffix == "gltf":
-        resolver = trimesh.resolvers.FilePathResolver(str(path))
+    if suffix in ("glb", "gltf"):
+        suffix = "glb" if content.startswith(b"glTF") else "gltf"
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # of numbers that `piece` refuses in words
         scene = trimesh.load_scene(io.BytesIO(content), file_type=suffix, process=False, resolver=resolver)
@@ -127,14 +139,9 @@ def _other(
             continue
         material = getattr(getattr(mesh.visual, "material", None), "name", None)
         label = str(material or path.stem)
-        if described is None:
-            pieces.append(
-                piece(label, mesh.vertices, mesh.faces, Material(_mesh_colour(mesh)), None, path, notes)
-            )
-        else:
-            uv = getattr(mesh.visual, "uv", None)
-            named = described.get(label, Material(_vertex_colour(mesh)))
-            pieces.append(piece(label, mesh.vertices, mesh.faces, named, uv, path, notes))
+        uv = getattr(mesh.visual, "uv", None)
+        named = (described or {}).get(label, Material(_vertex_colour(mesh)))
+        pieces.append(piece(label, mesh.vertices, mesh.faces, named, uv, path, notes))
     pieces = labelled(pieces)
     return checked(path, _stl_faces(content), pieces) if suffix == "stl" else pieces
 
@@ -143,16 +150,6 @@ def _stl_faces(content: bytes) -> int:
     """Facets of a binary STL, which may start with "solid" too, or of an ASCII one."""
     count = int.from_bytes(content[80:84], "little") if len(content) >= 84 else -1
     return count if len(content) >= 84 + 50 * count >= 84 else len(re.findall(rb"(?im)^\s*facet\s", content))
-
-
-def _mesh_colour(mesh: Any) -> Colour | None:
-    material = getattr(mesh.visual, "material", None)
-    if material is None:
-        return _vertex_colour(mesh)
-    picture = getattr(material, "baseColorTexture", None)
-    if picture is not None:
-        return _rgb(np.asarray(picture.convert("RGB"), float).reshape(-1, 3).mean(0) / 255)
-    return _rgb(np.asarray(material.main_color, float) / 255)
 
 
 def _vertex_colour(mesh: Any) -> Colour | None:

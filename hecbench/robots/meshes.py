@@ -19,13 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hecbench.robots import materials, mesh_files
-from hecbench.robots.materials import referenced_files
 from hecbench.robots.pieces import Piece
+from hecbench.robots.references import referenced_files
 from hecbench.robots.urdf import Mesh, Primitive, Visual
 from hecbench.robots.urdf_files import find_mesh, find_texture
 from hecbench.system import cache
 
-_CACHE_VERSION = 5
+_CACHE_VERSION = 6
 _GREY = (0.7, 0.7, 0.7)
 _SAME_M = 1e-6
 """Vertices this close are one."""
@@ -143,9 +143,7 @@ def _seen_from_both_sides(parts: tuple[Part, ...]) -> tuple[Part, ...]:
 
 def _digest(urdf: Path, used: Iterable[Path]) -> str:
     """A hash of the URDF, of every mesh and texture, and of the material files and textures that these name."""
-    named = (
-        other for path in used if path.suffix.lower() in (".obj", ".dae") for other in referenced_files(path)
-    )
+    named = (other for path in used for other in referenced_files(path))
     digest = hashlib.sha256(f"{_CACHE_VERSION}".encode())
     for path in [urdf, *sorted({*used, *named})]:
         digest.update(hashlib.sha256(path.read_bytes()).digest())

@@ -46,7 +46,9 @@ def piece(
     colour = material.colour
     if material.texture is not None:
         mean, fault = materials.textured(material.texture, uv, faces, vertices)
-        colour = mean or colour
+        if mean is not None:
+            red, green, blue = (float(value) for value in np.multiply(mean, material.tint))
+            colour = red, green, blue
         if fault is not None:
             notes.append(f"mesh {path.name}: material {name} has lost its texture: {fault}")
     return Piece(name, vertices, faces, colour)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from hecbench.errors import InputError
 from hecbench.robots import urdf as urdf_reader
-from hecbench.robots.materials import referenced_files
+from hecbench.robots.references import referenced_files
 from hecbench.system import files
 
 _PACKAGES = ("package://", "model://")
