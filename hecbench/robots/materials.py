@@ -46,7 +46,8 @@ def _text(path: Path) -> str:
 
 def libraries_of(obj: str) -> list[str]:
     """The material files that an OBJ file names; a name may hold blanks."""
-    names = [name.strip() for name in re.findall(r"(?m)^[ \t]*mtllib ([^\r\n]*)", obj)]
+    found = re.finditer(r"mtllib ([^\r\n]*)", obj)
+    names = [m[1].strip() for m in found if not obj[obj.rfind("\n", 0, m.start()) + 1 : m.start()].strip()]
     return [word for name in names for word in ([name] if name.count(".") < 2 else name.split())]
 
 

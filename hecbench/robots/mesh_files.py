@@ -49,7 +49,7 @@ def read(path: Path) -> tuple[list[Piece], list[str]]:
 
 def _wavefront(content: bytes, path: Path, notes: list[str]) -> list[Piece]:
     """OBJ: its faces by trimesh, its materials from the MTL files that it names."""
-    text = content.decode("utf-8", "replace")
+    text = content.decode("utf-8", "replace").replace("\t", " ")
     described: dict[str, Material] = {}
     for name in materials.libraries_of(text):
         if (library := path.parent / name.replace("\\", "/")).is_file():
@@ -60,7 +60,10 @@ def _wavefront(content: bytes, path: Path, notes: list[str]) -> list[Piece]:
     lines = _counted_from_the_first([line for line in lines if not line.startswith("mtllib ")])
     used = {line[7:].strip() for line in lines if line.startswith("usemtl ")}
     grey = "".join(f"newmtl {name}\nKd 0.5 0.5 0.5\n" for name in sorted(used)).encode()
-    expected = sum(len(line.split()) - 3 for line in lines if line.startswith("f "))
+    corners = [line.split()[1:] for line in lines if line.startswith("f ")]
+    if any(corner.split("/")[0] == "0" for face in corners for corner in face):
+        raise InputError(f"{path}: a face names vertex 0, and OBJ counts from 1: export it again")
+    expected = sum(len(face) - 2 for face in corners)
     plain = "\n".join(["mtllib own", *lines]).encode()
     pieces = _other(plain, path, notes, resolver=_Library(grey), described=described)
     return checked(path, expected, pieces)
@@ -147,9 +150,12 @@ def _other(
 
 
 def _stl_faces(content: bytes) -> int:
-    """Facets of a binary STL, which may start with "solid" too, or of an ASCII one."""
+    """Facets that a binary STL, which may start with "solid" too, declares, or that an ASCII one holds."""
     count = int.from_bytes(content[80:84], "little") if len(content) >= 84 else -1
-    return count if len(content) >= 84 + 50 * count >= 84 else len(re.findall(rb"(?im)^\s*facet\s", content))
+    if len(content) >= 84 + 50 * count >= 84:
+        return count
+    listed = len(re.findall(rb"(?im)^\s*facet\s", content))
+    return listed if listed or content[:5].lower() == b"solid" else max(count, 0)
 
 
 def _vertex_colour(mesh: Any) -> Colour | None:

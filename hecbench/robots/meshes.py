@@ -1,15 +1,9 @@
-"""Coloured visual meshes of a URDF's links (OBJ, STL, DAE, primitive shapes), parsed once and cached on disk.
-
-The cache holds plain arrays under the hash of everything they were made from; a damaged or stale entry is
-made anew.
-"""
+"""Coloured visual meshes of a URDF's links, parsed once and kept under the hash of everything they were made from."""
 
 from __future__ import annotations
 
 import hashlib
-import os
-import tempfile
-import zipfile
+import io
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -23,9 +17,9 @@ from hecbench.robots.pieces import Piece
 from hecbench.robots.references import referenced_files
 from hecbench.robots.urdf import Mesh, Primitive, Visual
 from hecbench.robots.urdf_files import find_mesh, find_texture
-from hecbench.system import cache
+from hecbench.system.cache import Cache
 
-_CACHE_VERSION = 6
+_KEPT = Cache("robots.sqlite", most_bytes=256 * 2**20)
 _GREY = (0.7, 0.7, 0.7)
 _SAME_M = 1e-6
 """Vertices this close are one."""
@@ -64,14 +58,15 @@ def visual_parts(visuals: Sequence[Visual], urdf: Path) -> tuple[tuple[Part, ...
         if isinstance(visual.shape, Mesh)
     }
     textures = {visual.texture: find_texture(visual.texture, urdf) for visual in visuals if visual.texture}
-    entry = cache.folder() / f"robot-{_digest(urdf, {*found.values(), *filter(None, textures.values())})}.npz"
-    if (cached := _read(entry)) is not None:
-        return cached
+    key = _digest(urdf, {*found.values(), *filter(None, textures.values())})
+    if (kept := _KEPT.get(key)) is not None:
+        return _unpacked(kept)
     notes: list[str] = []
     pieces = [_pieces(visual, found, textures, notes) for visual in visuals]
     parts = _seen_from_both_sides(tuple(part for visual in pieces for part in visual))
-    _write(entry, parts, notes := list(dict.fromkeys(notes)))
-    return parts, tuple(notes)
+    said = tuple(dict.fromkeys(notes))
+    _KEPT.put({key: _packed(parts, said)})
+    return parts, said
 
 
 def _pieces(
@@ -141,38 +136,34 @@ def _seen_from_both_sides(parts: tuple[Part, ...]) -> tuple[Part, ...]:
     return tuple(marked)
 
 
-def _digest(urdf: Path, used: Iterable[Path]) -> str:
-    """A hash of the URDF, of every mesh and texture, and of the material files and textures that these name."""
+def _digest(urdf: Path, used: Iterable[Path]) -> bytes:
+    """Of the URDF, of every mesh and texture, of the files that these name, and of the program that reads them."""
     named = (other for path in used for other in referenced_files(path))
-    digest = hashlib.sha256(f"{_CACHE_VERSION}".encode())
-    for path in [urdf, *sorted({*used, *named})]:
+    digest = hashlib.sha256()
+    for path in [*sorted(Path(__file__).parent.glob("*.py")), urdf, *sorted({*used, *named})]:
         digest.update(hashlib.sha256(path.read_bytes()).digest())
-    return digest.hexdigest()[:32]
+    return digest.digest()
 
 
-def _read(entry: Path) -> tuple[tuple[Part, ...], tuple[str, ...]] | None:
-    try:
-        with np.load(entry, allow_pickle=False) as data:
-            columns = zip(data["names"], data["links"], data["colours"], data["sources"], strict=True)
-            parts = tuple(
-                Part(
-                    str(name),
-                    str(link),
-                    (float(rgb[0]), float(rgb[1]), float(rgb[2])),
-                    data[f"vertices{i}"],
-                    data[f"faces{i}"],
-                    data[f"both_sides{i}"],
-                    str(source),
-                )
-                for i, (name, link, rgb, source) in enumerate(columns)
+def _unpacked(kept: bytes) -> tuple[tuple[Part, ...], tuple[str, ...]]:
+    with np.load(io.BytesIO(kept), allow_pickle=False) as data:
+        columns = zip(data["names"], data["links"], data["colours"], data["sources"], strict=True)
+        parts = tuple(
+            Part(
+                str(name),
+                str(link),
+                (float(rgb[0]), float(rgb[1]), float(rgb[2])),
+                data[f"vertices{i}"],
+                data[f"faces{i}"],
+                data[f"both_sides{i}"],
+                str(source),
             )
-            return parts, tuple(str(note) for note in data["notes"])
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
-        return None
+            for i, (name, link, rgb, source) in enumerate(columns)
+        )
+        return parts, tuple(str(note) for note in data["notes"])
 
 
-def _write(entry: Path, parts: tuple[Part, ...], notes: list[str]) -> None:
-    """Write aside, then rename; a folder that cannot be written only costs the next start its time."""
+def _packed(parts: tuple[Part, ...], notes: tuple[str, ...]) -> bytes:
     arrays: dict[str, Any] = {
         "names": np.array([part.name for part in parts]),
         "links": np.array([part.link for part in parts]),
@@ -182,10 +173,6 @@ def _write(entry: Path, parts: tuple[Part, ...], notes: list[str]) -> None:
     }
     for i, part in enumerate(parts):
         arrays |= {f"vertices{i}": part.vertices, f"faces{i}": part.faces, f"both_sides{i}": part.both_sides}
-    try:
-        entry.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=entry.parent, suffix=".npz", delete=False) as aside:
-            np.savez(aside, **arrays)
-        os.replace(aside.name, entry)
-    except OSError:
-        return
+    stream = io.BytesIO()
+    np.savez(stream, **arrays)
+    return stream.getvalue()

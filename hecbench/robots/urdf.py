@@ -26,6 +26,10 @@ _MOTIONS = {
 }
 _BASES = ("floating", "planar")
 _LIMITED = ("revolute", "prismatic")
+_FARTHEST_M = 1e4
+"""Of a link or shape from what it hangs on."""
+_SCALES = (1e-6, 1e6)
+"""Least and largest factor of a mesh: from micrometres to what nobody builds."""
 _WORLD = "world"
 """The frame that a joint may hang on without a link of that name, as Drake has it."""
 
@@ -177,6 +181,15 @@ class _Reader:
 
         origin = element.find("origin")
         xyz = self.numbers(origin, "xyz", 3, f"{where}: origin", np.zeros(3))
+        if np.abs(xyz).max() > _FARTHEST_M:
+            raise InputError(
+                f'{self.path}: {where}: origin: xyz is "{origin.get("xyz")}": give metres, {_FARTHEST_M:g} at most'
+            )
+        if origin is not None and origin.get("quat_xyzw") is not None:
+            quaternion = self.numbers(origin, "quat_xyzw", 4, f"{where}: origin")
+            if not np.linalg.norm(quaternion) > 0:
+                raise InputError(f"{self.path}: {where}: origin: quat_xyzw turns by nothing: correct it")
+            return se3.from_quat_xyzw(quaternion / np.linalg.norm(quaternion), xyz)
         roll, pitch, yaw = self.numbers(origin, "rpy", 3, f"{where}: origin", np.zeros(3))
         turns = (
             se3.so3_exp(angle * axis) for angle, axis in zip((yaw, pitch, roll), np.eye(3)[::-1], strict=True)
@@ -246,6 +259,10 @@ class _Reader:
                     f"{where} without a shape: left out; give its <geometry> a mesh, or remove it"
                 )
                 continue
+            if len(geometry) > 1:
+                self.notes.append(
+                    f"{where} has {len(geometry)} shapes: the first is drawn; give each a <visual> of its own"
+                )
             shape = self._shape(geometry[0], where)
             if shape is None:
                 self.notes.append(f"{where}: its {geometry[0].tag} has no size: left out")
@@ -260,9 +277,10 @@ class _Reader:
             if not (filename := element.get("filename", "").strip()):
                 raise InputError(f"{self.path}: {where} has no filename: name the mesh file")
             scale = self.numbers(element, "scale", 3, where, np.ones(3))
-            if not scale.all():
+            if not (_SCALES[0] <= np.abs(scale).min() and np.abs(scale).max() <= _SCALES[1]):
                 raise InputError(
-                    f'{self.path}: {where}: scale is "{element.get("scale")}": no factor may be 0'
+                    f'{self.path}: {where}: scale is "{element.get("scale")}": no factor may be 0, below'
+                    f" {_SCALES[0]:g} or above {_SCALES[1]:g}"
                 )
             return Mesh(str(filename), scale)
         if kind == "box":
@@ -282,12 +300,19 @@ class _Reader:
         if material is None:
             return None, None
         if material.find("color") is None and material.find("texture") is None:
-            material = self._materials.get(material.get("name"))
+            name = material.get("name")
+            material = self._materials.get(name)
             if material is None:
+                self.notes.append(f"{where}: its material '{name}' is defined nowhere: no colour of it")
                 return None, None
         texture = material.find("texture")
         named = None if texture is None else texture.get("filename")
         if material.find("color") is None:
             return None, named
-        red, green, blue, _ = self.numbers(material.find("color"), "rgba", 4, f"{where}: color")
+        rgba = self.numbers(material.find("color"), "rgba", 4, f"{where}: color")
+        if rgba.min() < 0 or rgba.max() > 1:
+            self.notes.append(
+                f"{where}: its colour goes beyond 0..1: clipped; divide by 255 where it is of 255"
+            )
+        red, green, blue, _ = np.clip(rgba, 0, 1)
         return (float(red), float(green), float(blue)), named

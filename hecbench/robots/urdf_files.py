@@ -5,6 +5,7 @@ from __future__ import annotations
 from glob import escape
 from itertools import takewhile
 from pathlib import Path
+from urllib.parse import unquote
 
 from hecbench.errors import InputError
 from hecbench.robots import urdf as urdf_reader
@@ -46,7 +47,7 @@ def _found(filename: str, urdf: Path) -> Path | None:
     for prefix in _PACKAGES:
         name = name.removeprefix(prefix)
     places = (urdf.parent, *urdf.parent.absolute().parents[:_FOLDERS_ABOVE])
-    for spelled in dict.fromkeys((name, name.replace("\\", "/"))):
+    for spelled in dict.fromkeys((name, name.replace("\\", "/"), unquote(name))):
         parts = Path(spelled).parts
         tails = [Path(*parts[skip:]) for skip in range(len(parts) if of_package else 1)]
         for tail in tails:

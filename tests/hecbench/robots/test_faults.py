@@ -104,6 +104,10 @@ FOLLOWS = '{}<mimic joint="{}" multiplier="{}" offset="{}"/>'
         (shape(mesh("c.stl", 'scale="0.1, 0.1, 0.1"')), 'scale is "0.1, 0.1, 0.1"'),
         (shape(mesh("c.stl", 'scale="nan 1 1"')), 'scale is "nan 1 1"'),
         (shape(mesh("c.stl", 'scale="1 1 0"')), "no factor may be 0"),
+        (shape(mesh("c.stl", 'scale="1 1e30 1"')), "no factor may be 0, below 1e-06 or above"),
+        (shape(mesh("c.stl", 'scale="1e-30 1 1"')), "no factor may be 0, below 1e-06"),
+        (robot(joint(inside='<origin xyz="0 0 1e300"/>')), "give metres, 10000 at most"),
+        (robot(joint(inside='<origin quat_xyzw="0 0 0 0"/>')), "turns by nothing"),
         (shape("<geometry><mesh/></geometry>"), "link 'base': visual: mesh has no filename"),
         (shape('<geometry><box size="1 1"/></geometry>'), "link 'base': visual: box: size is \"1 1\""),
         (shape('<geometry><sphere radius="-1"/></geometry>'), "sizes must be positive"),
@@ -303,6 +307,45 @@ def test_a_visual_without_a_shape_is_left_out_with_a_note(load, visual):
     model = load(shape(visual))
     assert model.parts == ()
     assert "link 'base': visual without a shape" in model.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("visual", "note"),
+    [
+        ('<geometry><box size="1 1 1"/><sphere radius="1"/></geometry>', "has 2 shapes: the first is drawn"),
+        ('<geometry><box size="1 1 1"/></geometry><material name="x"/>', "material 'x' is defined nowhere"),
+        (
+            '<geometry><box size="1 1 1"/></geometry><material name="x"><color rgba="255 0 0 255"/></material>',
+            "beyond 0..1: clipped",
+        ),
+    ],
+)
+def test_what_is_drawn_otherwise_than_told_is_noted(load, visual, note):
+    model = load(shape(visual))
+    assert len(model.parts[0].faces) == 12
+    assert max(model.parts[0].colour) <= 1
+    assert note in model.notes[0]
+
+
+def test_an_origin_may_be_a_quaternion(load):
+    turned = load(robot(joint(kind="fixed", inside='<origin xyz="1 0 0" quat_xyzw="0 0 2 2"/>')))
+    by_angles = load(robot(joint(kind="fixed", inside='<origin xyz="1 0 0" rpy="0 0 1.5707963267948966"/>')))
+    np.testing.assert_allclose(turned.link_poses(np.zeros(0)), by_angles.link_poses(np.zeros(0)), atol=1e-12)
+
+
+def test_an_obj_with_tabs_and_a_name_with_a_percent_sign(load, tmp_path):
+    (tmp_path / "my mesh.obj").write_text("v\t0\t0\t0\r\nv\t1\t0\t0\r\nv\t0\t1\t0\r\nf\t1\t2\t3\r\n")
+    assert len(load(shape(mesh("my%20mesh.obj"))).parts[0].faces) == 1
+
+
+def test_faces_that_a_file_declares_and_does_not_hold_are_counted(load, tmp_path):
+    binary = trimesh.creation.box((1, 1, 1)).export(file_type="stl")
+    (tmp_path / "c.stl").write_bytes(binary[:80] + (99).to_bytes(4, "little") + binary[84:])
+    with pytest.raises(InputError, match="0 of its 99 faces could be read"):
+        load(shape(mesh("c.stl")))
+    (tmp_path / "c.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 0 1 2\n")
+    with pytest.raises(InputError, match="a face names vertex 0, and OBJ counts from 1"):
+        load(shape(mesh("c.obj")))
 
 
 @pytest.mark.parametrize(
