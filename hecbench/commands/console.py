@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from hecbench.system.wording import significant
+
 if TYPE_CHECKING:
     from hecbench.estimate import Estimate
     from hecbench.report.tables import Table
@@ -91,9 +93,12 @@ def print_verdict(verdict: Verdict) -> None:
         click.echo(f"Expected error at that place: {verdict.at} (95 %)")
     _print_list("Why", verdict.reasons)
     _print_list(
-        "Agree", [f"{a.solver} ({a.evidence}) within {a.distance_mm:.2g} mm" for a in verdict.agreement]
+        "Agree",
+        [f"{a.solver} ({a.evidence}) within {significant(a.distance_mm)} mm" for a in verdict.agreement],
     )
-    _print_list("Disagree", [f"{r.solver} by {r.distance_mm:.2g} mm: {r.reason}" for r in verdict.rivals])
+    _print_list(
+        "Disagree", [f"{r.solver} by {significant(r.distance_mm)} mm: {r.reason}" for r in verdict.rivals]
+    )
     _print_list("Next", verdict.next)
 
 
@@ -182,7 +187,9 @@ class Progress:
             self._bar.advance(self._task, self._weight(self._at_work))
         if self._shown:
             self._bar.console.print(
-                f"{estimate.solver}: {estimate.status}, {estimate.seconds:.2g} s", style="dim", markup=False
+                f"{estimate.solver}: {estimate.status}, {significant(estimate.seconds)} s",
+                style="dim",
+                markup=False,
             )
 
 

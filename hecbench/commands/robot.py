@@ -9,6 +9,7 @@ import click
 
 from hecbench.commands import choices, console
 from hecbench.errors import InputError
+from hecbench.system.wording import significant
 
 if TYPE_CHECKING:
     import numpy as np
@@ -53,7 +54,11 @@ def robot(source: str, joints: str | None, picture: Path | None, as_json: bool) 
     for joint in found["joints"]:
         if joint["type"] != "fixed":
             follows = f", follows {joint['mimic']}" if joint["mimic"] else ""
-            limits = "" if joint["lower"] is None else f" {joint['lower']:.4g} to {joint['upper']:.4g}"
+            limits = (
+                ""
+                if joint["lower"] is None
+                else f" {significant(joint['lower'], 4)} to {significant(joint['upper'], 4)}"
+            )
             click.echo(f"  {joint['name']}: {joint['type']}{limits}{follows}")
     for note in found["notes"]:
         click.echo(f"  note: {note}")

@@ -8,6 +8,7 @@ import numpy as np
 
 from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity
+from hecbench.system.wording import significant
 
 ID = "camera_frame"
 
@@ -30,7 +31,7 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
     where = "around its origin, as trackers see them" if around else f"along its {along} axis, not along +z"
     summary = (
         f"camera_T_target is not in an optical frame (z forward, x right): the targets lie {where}; the typical one at "
-        f"({', '.join(f'{value:.2g}' for value in typical)}) m"
+        f"({', '.join(f'{significant(value)}' for value in typical)}) m"
     )
     action = "the answer is for this frame (camera_link, a tracker ...); photographs need the optical frame"
     return Finding(ID, Severity.INFO, summary, action), case

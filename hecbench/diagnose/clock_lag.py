@@ -11,6 +11,7 @@ from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity
 from hecbench.diagnose.fit import EXPLAINS, LEAST_SAMPLES
 from hecbench.se3 import Array
+from hecbench.system.wording import significant
 
 ID = "clock_lag"
 _LEAST = 12
@@ -150,7 +151,7 @@ def _confirmed(case: Examination, stamps: Array, lag_s: float) -> tuple[Finding 
     older = "older" if lag_s < 0 else "younger"
     summary = (
         f"the images are {abs(lag_s):.3f} s {older} than their robot poses: at that time the typical sample fits to "
-        f"{fit.typical_px:.2g} px, as given to {as_given:.3g} px"
+        f"{significant(fit.typical_px)} px, as given to {significant(as_given, 3)} px"
     )
     when = "earlier" if lag_s < 0 else "later"
     action = f"take the robot poses {abs(lag_s):.3f} s {when}, or stop the arm for samples"

@@ -7,6 +7,7 @@ import numpy as np
 from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity
 from hecbench.diagnose.precision import precision
+from hecbench.system.wording import significant
 
 ID = "conditioning"
 LIMIT_MM = 10.0
@@ -26,7 +27,7 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
     condition = float(np.sqrt(variances[-1] / max(variances[0], 1e-12 * variances[-1])))
     expected_mm = found.expected_mm()
     summary = (
-        f"expected error in the workspace {expected_mm:.2g} mm (one sigma); weakest is "
+        f"expected error in the workspace {significant(expected_mm)} mm (one sigma); weakest is "
         f"{_described(directions[:, -1])}, {condition:.0f} times as uncertain as the strongest"
     )
     if expected_mm > LIMIT_MM:

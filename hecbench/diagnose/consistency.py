@@ -9,6 +9,7 @@ import numpy as np
 from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity
 from hecbench.samples.agreement import LARGEST_SHARE, percent
+from hecbench.system.wording import significant
 
 ID = "consistency"
 
@@ -31,7 +32,7 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
             case, judged=False
         )
     summary = (
-        f"the typical sample agrees with one calibration to {fit.in_mm(fit.typical_px):.2g} mm "
-        f"({fit.typical_px:.2g} px) across the view"
+        f"the typical sample agrees with one calibration to {significant(fit.in_mm(fit.typical_px))} mm "
+        f"({significant(fit.typical_px)} px) across the view"
     )
     return Finding(ID, Severity.OK, summary, value=left, limit=LARGEST_SHARE), case

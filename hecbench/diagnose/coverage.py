@@ -6,6 +6,7 @@ import numpy as np
 
 from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity
+from hecbench.system.wording import significant
 from hecbench.targets import Target
 
 ID = "coverage"
@@ -44,7 +45,7 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
     samples = f"{len(positions)} samples"
     if case.pictures > len(case.recording):
         samples = f"{case.pictures} samples at {len(positions)} robot poses, which count once each"
-    summary = f"{samples}, target positions spread by {size} mm rms at {distance_m:.2g} m"
+    summary = f"{samples}, target positions spread by {size} mm rms at {significant(distance_m)} m"
     if len(positions) < FEW_SAMPLES:
         action = "record samples at 10 or more robot poses"
         return Finding(ID, Severity.WARNING, summary, action, float(len(positions)), float(FEW_SAMPLES)), case

@@ -8,6 +8,7 @@ from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity, names
 from hecbench.errors import InputError
 from hecbench.samples.spread import evenly
+from hecbench.system.wording import significant
 
 ID = "depth"
 NEAREST_M, FARTHEST_M = 0.15, 12.0
@@ -55,7 +56,7 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
             unit for factor, unit in _UNITS.items() if NEAREST_M < factor * median_m < 0.5 * FARTHEST_M
         ]
         says = f": {' or '.join(fitting[:2])} rather than millimetres?" if fitting else ""
-        summary = f"the median depth is {1e3 * median_m:.4g} mm{says}"
+        summary = f"the median depth is {significant(1e3 * median_m, 4)} mm{says}"
         return Finding(ID, Severity.CRITICAL, summary, _CURE, median_m, FARTHEST_M), case
     if faulty or empty:
         summary = "; ".join([*reasons[:1], *([f"{names(tuple(empty))}: hold no depth"] if empty else [])])

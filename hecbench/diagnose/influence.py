@@ -7,6 +7,7 @@ import numpy as np
 from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity
 from hecbench.diagnose.precision import precision
+from hecbench.system.wording import significant
 
 ID = "influence"
 LIMIT = 3.0
@@ -25,9 +26,8 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
     ids = case.ids(case.agreed[1])
     concerned, each = (ids[worst],), dict(zip(ids, moved_mm.tolist(), strict=True))
     value, limit = float(moved_mm[worst]), LIMIT * found.expected_mm()
-    summary = (
-        f"without sample {concerned[0]} the answer moves by {value:.2g} mm in the workspace, the most of all"
-    )
+    moves = f"moves by {significant(value)} mm in the workspace, the most of all"
+    summary = f"without sample {concerned[0]} the answer {moves}"
     if value > limit:
         action = "record more samples like this one, or look whether it is right"
         return Finding(ID, Severity.WARNING, summary, action, value, limit, concerned, each), case

@@ -15,6 +15,7 @@ from hecbench.diagnose.resolution import BY_SIZE, OFF_CENTRE, off_centre, rescal
 from hecbench.errors import InputError
 from hecbench.recording import CameraModel, Recording
 from hecbench.system import pictures
+from hecbench.system.wording import significant
 
 ID = "intrinsics"
 _HALF = 0.5
@@ -54,8 +55,9 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
         if best is not None and best[2].relative < EXPLAINS and best[0] < _HALF * _angle(fit, camera.K[0, 0]):
             ratio, better = best[1], best[2]
             summary = (
-                f"the intrinsics are of another resolution: times {ratio:.3g} the typical sample fits to "
-                f"{better.typical_px:.2g} px, as given to {fit.typical_px if fit else np.inf:.3g} px"
+                f"the intrinsics are of another resolution: times {significant(ratio, 3)} the typical sample fits to "
+                f"{significant(better.typical_px)} px, as given to "
+                f"{significant(fit.typical_px if fit else np.inf, 3)} px"
             )
             return Finding(ID, Severity.CRITICAL, summary, BY_SIZE, ratio, 1.0), _cured(case, camera, ratio)
     if outside:
@@ -67,7 +69,7 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
     across, down = camera.K[:2, 2] / [camera.width, camera.height]
     if abs(across - down) < _SAME_RATIO:
         ratio = 1 / (across + down)
-        summary += f", as for images of {1 / ratio:.3g} times this size"
+        summary += f", as for images of {significant(1 / ratio, 3)} times this size"
         return Finding(ID, Severity.CRITICAL, summary, BY_SIZE, offset, OFF_CENTRE), _cured(
             case, camera, ratio
         )

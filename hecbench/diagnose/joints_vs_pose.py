@@ -12,6 +12,7 @@ from hecbench.diagnose.calibrate import spread
 from hecbench.diagnose.case import Examination, inverted
 from hecbench.diagnose.finding import Finding, Severity
 from hecbench.se3 import Array
+from hecbench.system.wording import significant
 
 ID = "joints_vs_pose"
 LIMIT_MM = 3.0
@@ -96,7 +97,7 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
     if found is None:
         return None, case
     degrees, millimetres = found.typical
-    left = f"{millimetres:.2g} mm and {degrees:.2g} deg"
+    left = f"{significant(millimetres)} mm and {significant(degrees)} deg"
     if not found.holds:
         summary = f"robot poses and forward kinematics of the joints differ by {left} in the typical sample"
         action = "check robot.model, base_link, flange_link and the order and unit (rad) of the joints"
@@ -106,7 +107,7 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
         return Finding(ID, Severity.OK, summary, value=millimetres, limit=LIMIT_MM), case
     offset_mm = 1e3 * float(np.linalg.norm(found.constant[:3, 3]))
     offset_deg = float(np.rad2deg(se3.rotation_angle(found.constant[:3, :3])))
-    offset = f"by a constant {offset_mm:.4g} mm and {offset_deg:.4g} deg"
+    offset = f"by a constant {significant(offset_mm, 4)} mm and {significant(offset_deg, 4)} deg"
     if found.kind == "tool":
         summary = f"robot poses end {offset} away from the flange that the joints give"
         action = (

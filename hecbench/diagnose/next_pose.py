@@ -15,6 +15,7 @@ from hecbench.diagnose.finding import Finding, Severity
 from hecbench.diagnose.precision import Precision, information_of, precision
 from hecbench.recording import CameraModel, hand_poses
 from hecbench.se3 import Array
+from hecbench.system.wording import significant
 
 ID = "next_pose"
 _TILT_DEG = 35.0
@@ -50,7 +51,7 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
     turn, move = options[visible[best]]
     summary = (
         f"most useful next: the target {_turned(turn)}, {_moved(move, _STEP * extent)}: the expected error in the "
-        f"workspace falls from {now:.2g} to {after[best]:.2g} mm"
+        f"workspace falls from {significant(now)} to {significant(after[best])} mm"
     )
     return Finding(ID, Severity.INFO, summary, value=after[best], limit=now), case
 

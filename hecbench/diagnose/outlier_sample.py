@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from hecbench.diagnose.case import STANDS_OUT, Examination
 from hecbench.diagnose.finding import Finding, Severity, names
+from hecbench.system.wording import significant
 
 ID = "outlier_sample"
 LIMIT_MM = 12.0
@@ -34,11 +35,11 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
         severity = Severity.OK if worst <= limit else Severity.INFO
         if severity is Severity.INFO:
             i = int(studentised.argmax())
-            summary += f", by {millimetres[i]:.2g} mm and {degrees[i]:.2g} deg"
+            summary += f", by {significant(millimetres[i])} mm and {significant(degrees[i])} deg"
         return Finding(ID, severity, summary, value=worst, limit=limit), case
     moved = _moved_together(case, odd)
     concerned = case.ids(odd if moved is None else odd | moved)
-    off = f"up to {millimetres[odd].max():.3g} mm and {degrees[odd].max():.2g} deg"
+    off = f"up to {significant(millimetres[odd].max(), 3)} mm and {significant(degrees[odd].max())} deg"
     if moved is not None:
         summary = (
             f"samples {names(concerned)} follow each other and are displaced alike, by {off}: something moved"

@@ -11,6 +11,7 @@ from hecbench.diagnose.case import STANDS_OUT, Examination
 from hecbench.diagnose.finding import Finding, Severity, names
 from hecbench.diagnose.fit import EXPLAINS, LEAST_SAMPLES, MUCH_BETTER
 from hecbench.diagnose.sequences import shifts, text_orders
+from hecbench.system.wording import significant
 
 ID = "pairing"
 _SHIFTS = (1, -1)
@@ -41,7 +42,7 @@ def _all_shifted(case: Examination) -> tuple[Finding, Examination] | None:
             which = "next" if shift > 0 else "previous"
             summary = (
                 f"every image belongs to the robot pose of the {which} sample: the typical sample then fits to "
-                f"{moved.typical_px:.2g} px, as given to {as_given:.3g} px"
+                f"{significant(moved.typical_px)} px, as given to {significant(as_given, 3)} px"
             )
             action = f"shift the robot poses by one against the images; drop the {'last' if shift > 0 else 'first'}"
             value, limit = moved.typical_px, MUCH_BETTER * as_given
@@ -54,7 +55,7 @@ def _in_text_order(case: Examination) -> tuple[Finding, Examination] | None:
     for says, order in text_orders(len(case.usable)):
         sorted_otherwise = case.fit_of(case.base_T_flange[order], case.camera_T_target)
         if sorted_otherwise is not None and sorted_otherwise.cures(case.fit):
-            summary = f"{says}: sorted alike the typical sample fits to {sorted_otherwise.typical_px:.2g} px"
+            summary = f"{says}: sorted alike the typical sample fits to {significant(sorted_otherwise.typical_px)} px"
             action = "number the files with leading zeros, or sort both by number"
             finding = Finding(ID, Severity.CRITICAL, summary, action, sorted_otherwise.typical_px)
             return finding, _repaired(case, np.arange(len(order)), order)

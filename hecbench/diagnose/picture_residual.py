@@ -21,6 +21,7 @@ from hecbench.diagnose.rivals import (
     rivals,
 )
 from hecbench.lens import EQUIDISTANT, CameraModel, parameters_of
+from hecbench.system.wording import significant
 from hecbench.targets import PointsTarget
 
 ID = "picture_residual"
@@ -72,7 +73,7 @@ def _unexplained(case: Examination, given: Judged) -> tuple[Finding, Examination
     size_px = float(
         np.median(np.linalg.norm(np.nanmax(corners, axis=1) - np.nanmin(corners, axis=1), axis=1))
     )
-    summary = f"each picture alone fits to {given.noise_px:.2g} px"
+    summary = f"each picture alone fits to {significant(given.noise_px)} px"
     limit = _UNEXPLAINED * size_px
     if given.noise_px > limit:
         summary += f", of a target {size_px:.0f} px wide: the corners are not those of the declared target"
@@ -97,7 +98,7 @@ def _equal(found: list[Judged]) -> list[Judged]:
 def _named(
     case: Examination, given: Judged, best: Judged, equal: list[Judged]
 ) -> tuple[Finding, Examination]:
-    left = f"the pictures alone leave {given.noise_px:.2g} px, otherwise {best.noise_px:.2g} px"
+    left = f"the pictures alone leave {significant(given.noise_px)} px, otherwise {significant(best.noise_px)} px"
     says, cure = _described(best, case)
     if len(equal) > 1:
         others = "; or ".join(f"{_described(other, case)[0]}" for other in equal[1:])
@@ -134,7 +135,7 @@ def _described(result: Judged, case: Examination) -> tuple[str, str]:
             f"{_REFIT}{_matrix_values(camera)}; rectified pictures need the matrix P of the rectification",
         )
     if rival.free:
-        values = f"distortion [{', '.join(f'{k:.4g}' for k in camera.distortion)}]"
+        values = f"distortion [{', '.join(f'{significant(k, 4)}' for k in camera.distortion)}]"
         if camera.distortion_model == EQUIDISTANT:
             values += ' with distortion_model "equidistant"'
         matrix = "" if 0 not in rival.free else f"{_matrix_values(camera)}, "

@@ -14,6 +14,7 @@ from hecbench import se3
 from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity, names
 from hecbench.se3 import Array
+from hecbench.system.wording import significant
 
 ID = "planar_ambiguity"
 LEAST_DEG = 8.0
@@ -37,7 +38,7 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
     flipped = suspected & (_angles_deg(mirrored, predicted[:, :3, 2]) < _CLOSER * gaps)
     typical = float(np.rad2deg(np.median(se3.rotation_error_rad(observed, predicted))))
     if not flipped.any():
-        summary = f"no target pose is mirrored; their typical rotation error is {typical:.2g} deg"
+        summary = f"no target pose is mirrored; their typical rotation error is {significant(typical)} deg"
         return Finding(ID, Severity.OK, summary, value=float(gaps.max()), limit=LEAST_DEG), case
     concerned = case.ids(flipped)
     summary = f"{len(concerned)} target poses are mirrored, by up to {gaps[flipped].max():.0f} deg: {names(concerned)}"

@@ -12,6 +12,7 @@ from hecbench import se3
 from hecbench.diagnose.case import Examination, inverted, other
 from hecbench.diagnose.finding import Finding, Severity
 from hecbench.diagnose.fit import MUCH_BETTER
+from hecbench.system.wording import significant
 
 ID = "pose_direction_or_mounting"
 _AGREES_DEG = 10.0
@@ -26,14 +27,16 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
     if turned.fit is None or not turned.fit.cures(case.fit):
         if case.fit is None:
             return None, case
-        summary = f"as declared the typical sample fits to {as_declared:.2g} px"
+        summary = f"as declared the typical sample fits to {significant(as_declared)} px"
         if turned.fit is not None:
-            summary += f", with inverted robot poses to {turned.fit.typical_px:.3g} px"
+            summary += f", with inverted robot poses to {significant(turned.fit.typical_px, 3)} px"
         return Finding(ID, Severity.OK, summary, value=as_declared), case
     better = turned.fit.typical_px
-    before = "not at all" if case.fit is None else f"to {as_declared:.3g} px"
+    before = "not at all" if case.fit is None else f"to {significant(as_declared, 3)} px"
     cause, action = _cause_and_cure(case)
-    summary = f"{cause}: as declared the typical sample fits {before}, the other way to {better:.2g} px"
+    summary = (
+        f"{cause}: as declared the typical sample fits {before}, the other way to {significant(better)} px"
+    )
     limit = None if case.fit is None else MUCH_BETTER * as_declared
     return Finding(ID, Severity.CRITICAL, summary, action, better, limit), turned
 

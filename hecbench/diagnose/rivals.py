@@ -15,6 +15,7 @@ from hecbench.lens import EQUIDISTANT, OPENCV, CameraModel, Sensor, parameters_o
 from hecbench.preparation import prepare
 from hecbench.recording import Recording
 from hecbench.se3 import Array
+from hecbench.system.wording import significant
 from hecbench.targets import grid_shape
 
 LEAST_POINTS = 4
@@ -157,7 +158,7 @@ def rivals(recording: Recording) -> Iterator[Rival]:
     last = 4 + len(camera.distortion)
     yield Rival(BOARD, "the squares are not square", "", recording, (last,))
     for ratio, scaled in rescaled(camera):
-        says = f"the intrinsics are of another resolution: times {ratio:.3g} they fit"
+        says = f"the intrinsics are of another resolution: times {significant(ratio, 3)} they fit"
         yield Rival(RESOLUTION, says, BY_SIZE, replace(recording, camera=scaled))
     for free in _MATRIX_FREE:
         yield Rival(MATRIX, "camera.K does not belong to these pictures", "", recording, free)

@@ -15,6 +15,7 @@ from hecbench.diagnose.calibrate import spread
 from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity
 from hecbench.se3 import Array
+from hecbench.system.wording import significant
 
 ID = "rotation_diversity"
 LEAST_ANGLE_DEG = 10.0
@@ -38,12 +39,14 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
         return finding, replace(case, judged=False)
     largest, second = turns_deg(rotations)
     if largest < LEAST_ANGLE_DEG:
-        summary = f"the hand turns by {largest:.2g} deg at most between samples"
+        summary = f"the hand turns by {significant(largest)} deg at most between samples"
         finding = Finding(ID, Severity.CRITICAL, summary, _TILT, largest, LEAST_ANGLE_DEG)
         return finding, replace(case, judged=False)
-    summary = f"the hand turns by up to {largest:.0f} deg, by {second:.2g} deg rms about its second axis"
+    summary = (
+        f"the hand turns by up to {largest:.0f} deg, by {significant(second)} deg rms about its second axis"
+    )
     if second < LEAST_SECOND_AXIS_DEG:
-        summary = f"the hand turns about one axis only: {second:.2g} deg rms about any other"
+        summary = f"the hand turns about one axis only: {significant(second)} deg rms about any other"
         finding = Finding(ID, Severity.CRITICAL, summary, _TILT, second, LEAST_SECOND_AXIS_DEG)
         return finding, replace(case, judged=False)
     if second < GOOD_SECOND_AXIS_DEG:

@@ -15,6 +15,7 @@ from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity
 from hecbench.diagnose.fit import EXPLAINS, MUCH_BETTER
 from hecbench.se3 import Array
+from hecbench.system.wording import significant
 
 ID = "rotation_convention"
 MIRRORED_ID = "mirrored_images"
@@ -47,7 +48,7 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
         read = case.fit_of(poses, case.camera_T_target)
         if read is not None and read.cures(case.fit):
             summary = f"the rotations of base_T_flange were misread: {reading.says}: the typical sample then fits to "
-            summary += f"{read.typical_px:.2g} px, as given to {as_given:.3g} px"
+            summary += f"{significant(read.typical_px)} px, as given to {significant(as_given, 3)} px"
             action = "read the robot's rotations so, and write base_T_flange anew"
             finding = Finding(ID, Severity.CRITICAL, summary, action, read.typical_px, MUCH_BETTER * as_given)
             kept = replace(case.recording.subset(case.usable), base_T_flange=poses, joints_rad=None)
@@ -64,9 +65,8 @@ def _mirrored(case: Examination) -> tuple[Finding, Examination] | None:
     flipped = replace(case, recording=replace(recording, corners_px=corners, camera_T_target=None))
     if flipped.fit is None or not flipped.fit.cures(case.fit):
         return None
-    summary = (
-        f"the images are mirrored: flipped back the typical sample fits to {flipped.fit.typical_px:.2g} px"
-    )
+    flipped_px = significant(flipped.fit.typical_px)
+    summary = f"the images are mirrored: flipped back the typical sample fits to {flipped_px} px"
     action = (
         "turn off the camera driver's mirror (webcams show a mirror image), or flip the images left to right"
     )

@@ -11,6 +11,7 @@ from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity, names
 from hecbench.diagnose.joints_vs_pose import agreement
 from hecbench.se3 import Array
+from hecbench.system.wording import significant
 
 ID = "sample_moving"
 LIMIT_MM = 2.0
@@ -45,8 +46,8 @@ def _by_joints(case: Examination) -> Finding | None:
     concerned = tuple(case.recording.sample_ids[i] for i in found.indices[off].tolist())
     worst = float(found.millimetres[off].max())
     summary = (
-        f"joints and robot pose of {names(concerned)} are of different moments: up to {worst:.2g} mm and "
-        f"{found.degrees[off].max():.2g} deg apart, elsewhere {typical_mm:.2g} mm"
+        f"joints and robot pose of {names(concerned)} are of different moments: up to {significant(worst)} mm and "
+        f"{significant(found.degrees[off].max())} deg apart, elsewhere {significant(typical_mm)} mm"
     )
     return Finding(ID, Severity.CRITICAL, summary, _CURE, worst, LIMIT_MM, concerned)
 
@@ -70,14 +71,15 @@ def _by_stamps(case: Examination) -> Finding | None:
     off = (lags > LIMIT_LAG_S) & ((moved_mm > LIMIT_MM) | (moved_deg > LIMIT_DEG))
     worst = float(lags.max())
     if not off.any():
-        summary = (
-            f"image and robot pose of each sample are at most {1e3 * worst:.2g} ms apart beyond the usual"
-        )
+        apart = f"{significant(1e3 * worst)} ms apart"
+        summary = f"image and robot pose of each sample are at most {apart} beyond the usual"
         return Finding(ID, Severity.OK, summary, value=worst, limit=LIMIT_LAG_S)
     concerned = tuple(recording.sample_ids[i] for i in known[off].tolist())
     summary = (
-        f"image and robot pose of {names(concerned)} are up to {1e3 * worst:.3g} ms farther apart than usual, "
-        f"in which the arm moves by up to {moved_mm[off].max():.2g} mm and {moved_deg[off].max():.2g} deg"
+        f"image and robot pose of {names(concerned)} are up to {significant(1e3 * worst, 3)} ms farther "
+        "apart than usual, "
+        f"in which the arm moves by up to {significant(moved_mm[off].max())} mm and "
+        f"{significant(moved_deg[off].max())} deg"
     )
     return Finding(ID, Severity.CRITICAL, summary, _CURE, worst, LIMIT_LAG_S, concerned)
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from hecbench.diagnose.case import Examination
 from hecbench.diagnose.finding import Finding, Severity
+from hecbench.system.wording import significant
 
 ID = "units"
 REACH_M = 10.0
@@ -26,16 +27,17 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
     unit = _unit(case.fit.state.scale) if case.fit else None
     if reach_m > REACH_M:
         factor, name = unit if unit and unit[0] > 1 else (1000.0, "mm")
-        summary = (
-            f"the flange is up to {reach_m:.4g} m from the base: its positions are in {name}, not in metres"
-        )
+        reach = f"the flange is up to {significant(reach_m, 4)} m from the base"
+        summary = f"{reach}: its positions are in {name}, not in metres"
         action = f"divide the translations of base_T_flange by {factor:g}"
         return _critical(summary, action, reach_m, REACH_M), _rescaled_robot(case, factor)
     size_m = 0.0 if target is None else float(np.ptp(target.points_m, axis=0).max())
     if size_m > LARGEST_TARGET_M or (unit and unit[0] < 1):
         factor, name = (1 / unit[0], unit[1]) if unit and unit[0] < 1 else (1000.0, "mm")
-        motion = f"it seems to move {factor:.3g} times as far as the robot carries it" if unit else ""
-        what = f"the target of {size_m:.4g} m is given in {name}, not in metres"
+        motion = (
+            f"it seems to move {significant(factor, 3)} times as far as the robot carries it" if unit else ""
+        )
+        what = f"the target of {significant(size_m, 4)} m is given in {name}, not in metres"
         if target is None:
             what = f"camera_T_target is in {name}, not in metres"
         summary = f"{what}: {motion}" if motion else what
@@ -44,13 +46,14 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
             case, 1 / factor
         )
     if unit:
-        summary = f"the robot moves {unit[0]:.3g} times as far as the target: one of the two is not in metres"
+        times = f"the robot moves {significant(unit[0], 3)} times as far as the target"
+        summary = f"{times}: one of the two is not in metres"
         action = (
             f"give the target's size in metres (it looks {unit[0]:g} times too small), or the robot poses"
         )
         return _critical(summary, action, unit[0], _NEAR), _resized_target(case, unit[0])
     return Finding(
-        ID, Severity.OK, f"the flange stays within {reach_m:.2g} m", value=reach_m, limit=REACH_M
+        ID, Severity.OK, f"the flange stays within {significant(reach_m)} m", value=reach_m, limit=REACH_M
     ), case
 
 

@@ -26,6 +26,7 @@ from hecbench.exchange.stillness import (
 from hecbench.recording import Mounting, hand_poses
 from hecbench.samples import agreement
 from hecbench.se3 import Array
+from hecbench.system.wording import significant
 
 HINTS_NAME = "hecbench-import.yaml"
 """The file beside other people's data that says what they do not (docs/adapters.md)."""
@@ -228,7 +229,7 @@ def _margin(
         names = " or ".join(rival.beside(best) for rival in rivals)
         note += f"; {names} would fit as well: if that is meant, {_CURE}"
     elif worse:
-        note += f"; the next leaves {min(worse) / max(best.stillness.relative, 1e-9):.3g} times as much"
+        note += f"; the next leaves {significant(min(worse) / max(best.stillness.relative, 1e-9), 3)} times as much"
     return note
 
 
@@ -254,7 +255,8 @@ def _cause(
         scaled[:, :3, 3] *= (factor := length_factor(hand, seen))
         if factor > 0 and stillness(hand, scaled).relative < _CONVINCING:
             return (
-                f", but {candidate.name} does once the target's lengths are {factor:.4g} times as long: correct the "
+                f", but {candidate.name} does once the target's lengths are {significant(factor, 4)} "
+                "times as long: correct the "
                 "unit of one of the two"
             )
     return ""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from hecbench import se3
 from hecbench.se3 import Array
+from hecbench.system.wording import significant
 
 _MOST_FITTED = 40
 _SECOND_AXIS_RAD = np.deg2rad(2.0)
@@ -25,7 +26,7 @@ class Stillness:
     relative: float
 
     def __str__(self) -> str:
-        return f"{self.rotation_deg:.3g} deg, {self.translation_mm:.3g} mm"
+        return f"{significant(self.rotation_deg, 3)} deg, {significant(self.translation_mm, 3)} mm"
 
 
 def rotation_misfits(hands: Sequence[Array], targets: Sequence[Array]) -> Array:

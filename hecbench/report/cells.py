@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hecbench.statistics import Interval
+from hecbench.system.wording import significant
 
 ABSENT = "-"
 NO_ANSWER = 1e12
@@ -18,7 +19,7 @@ def number(value: float | np.floating | None) -> str:
         return ABSENT
     if value >= NO_ANSWER / 1000:
         return "∞"
-    return f"{value:.0f}" if value >= 1000 else f"{value:.2g}" if abs(value) < 0.01 else f"{value:.3g}"
+    return f"{value:.0f}" if abs(value) >= 1000 else significant(value, 2 if abs(value) < 0.01 else 3)
 
 
 def interval(interval: Interval) -> str:

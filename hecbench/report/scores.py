@@ -14,6 +14,7 @@ from hecbench.report import paper
 from hecbench.report.cells import NO_ANSWER, interval, number
 from hecbench.se3 import Array
 from hecbench.statistics import Interval
+from hecbench.system.wording import significant
 
 ERROR = "camera_T_parent_translation_error_mm"
 """Translation of camera_T_base, the unknown of the paper's Table I."""
@@ -144,7 +145,7 @@ def rate(flags: Iterable[bool]) -> str:
     if not counted:
         return "-"
     found = statistics.wilson(sum(counted), len(counted))
-    return f"{100 * found.value:.3g} [{100 * found.low:.0f}, {100 * found.high:.0f}]"
+    return f"{significant(100 * found.value, 3)} [{100 * found.low:.0f}, {100 * found.high:.0f}]"
 
 
 def rate_where(runs: Iterable[Estimate], test: Callable[[Estimate], bool | None]) -> str:

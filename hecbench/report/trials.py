@@ -21,6 +21,7 @@ from hecbench.report.svg import COLOURS, panel, svg
 from hecbench.report.tables import Table
 from hecbench.storage.trial_record import TASKS, Outcome, TrialRecord, picture_name
 from hecbench.system import files
+from hecbench.system.wording import significant
 
 PAPER_PCT = {
     "ur5e": {
@@ -175,7 +176,7 @@ def _paired_table(robot: str, clearance_mm: float, trials: Sequence[TrialRecord]
             pairs = [(first[key], second[key]) for key in shared]
             wins, losses = sum(a and not b for a, b in pairs), sum(b and not a for a, b in pairs)
             p = statistics.paired_success_p(*zip(*pairs, strict=True)) if pairs else None
-            cells += [ABSENT, ABSENT] if p is None else [f"{wins} : {losses}", f"{p:.2g}"]
+            cells += [ABSENT, ABSENT] if p is None else [f"{wins} : {losses}", f"{significant(p)}"]
         rows.append((method, *cells))
     header = ("method", *(f"{task} {column}" for task in TASKS for column in ("won : lost", "p")))
     note = (
@@ -249,7 +250,7 @@ def _outcomes(trials: Iterable[TrialRecord]) -> dict[tuple[str, int, int], bool]
 
 def _median(values: Iterable[float | None]) -> str:
     known = [value for value in values if value is not None]
-    return f"{np.median(known):.3g}" if known else ABSENT
+    return f"{significant(np.median(known), 3)}" if known else ABSENT
 
 
 def _range(interval: statistics.Interval) -> str:

@@ -21,6 +21,7 @@ from hecbench.robots.posed import PosedRobot
 from hecbench.running.isolation import stdout_to_stderr
 from hecbench.se3 import Array
 from hecbench.system import files
+from hecbench.system.wording import significant
 
 _BOLD_RGB, _RIVAL_RGB, _TARGET_RGB = (20, 120, 60), (150, 160, 175), (255, 120, 30)
 _FRUSTUM_M = 0.12
@@ -160,7 +161,7 @@ class Stage:
             e.solver: e.parent_T_camera[:3, 3] for e in self.estimates if e.parent_T_camera is not None
         }
         rows = [
-            f"- {name}: {1e3 * float(np.linalg.norm(centre - centres[solver])):.2g} mm"
+            f"- {name}: {significant(1e3 * float(np.linalg.norm(centre - centres[solver])))} mm"
             for name, centre in centres.items()
             if name != solver
         ]

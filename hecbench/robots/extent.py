@@ -7,6 +7,7 @@ import numpy as np
 from hecbench import se3
 from hecbench.robots.model import RobotModel
 from hecbench.se3 import Array
+from hecbench.system.wording import significant
 
 _WIDER = 20.0
 """A part wider than its robot's reach by this factor is in another unit: millimetres are a thousand."""
@@ -29,7 +30,7 @@ def oversized(model: RobotModel) -> tuple[str, ...]:
         if reach > 0 and width > _WIDER * reach:
             name = f"mesh {part.source}" if part.source else f"part {part.name}"
             found[name] = (
-                f"{name} is {width:.4g} m wide, the robot reaches {reach:.2g} m: in millimetres? "
+                f"{name} is {significant(width, 4)} m wide, the robot reaches {significant(reach)} m: in millimetres? "
                 'add scale="0.001 0.001 0.001"'
             )
     return tuple(found.values())

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from hecbench.errors import InputError
 from hecbench.se3 import Array
+from hecbench.system.wording import significant
 
 _HAIR = 0.005
 """Of a joint's range: encoders and rounded limits stray by less; a wrong unit or order by far more."""
@@ -66,15 +67,16 @@ class Joint:
 
     def reason(self, position: float) -> str:
         """Why a position is refused, and the cure."""
-        limits = f"{self.lower:.4g} to {self.upper:.4g}"
+        limits = f"{significant(self.lower, 4)} to {significant(self.upper, 4)}"
         if self.lower > self.upper:
             return f"the URDF's limits of {self.name} are reversed ({limits}): swap lower and upper in its <limit>"
         if self.lower == self.upper:
             return (
-                f"the URDF limits {self.name} to {self.lower:g}..{self.upper:g}, but it is at {position:.4g}: "
+                f"the URDF limits {self.name} to {self.lower:g}..{self.upper:g}, but it is at "
+                f"{significant(position, 4)}: "
                 "correct its <limit>"
             )
-        outside = f"{self.name} at {position:.4g} is outside its limits {limits}"
+        outside = f"{self.name} at {significant(position, 4)} is outside its limits {limits}"
         small = np.deg2rad(position) if self.motion is Motion.REVOLUTE else position / 1000
         if not self.refuses(np.array(small)):
             units = (

@@ -10,6 +10,7 @@ import numpy as np
 
 from hecbench import se3
 from hecbench.se3 import Array
+from hecbench.system.wording import significant
 
 LARGEST_SHARE = 0.25
 """Of its own motion that a target may be off; good data leave a few per cent, small tags with flips a tenth."""
@@ -53,8 +54,8 @@ def contradiction(hand: Array, seen: Array, parent_T_camera: Array, carrier_T_ta
         what = f"leaves the typical target {percent(in_view)} of its own motion in the view away from where it was seen"
     elif share_left(left_rad, turned) > LARGEST_TURN_SHARE:
         what = (
-            f"leaves the typical target turned by {np.rad2deg(np.median(left_rad)):.3g} deg where the hand turned by "
-            f"{np.rad2deg(np.median(turned)):.3g}"
+            f"leaves the typical target turned by {significant(np.rad2deg(np.median(left_rad)), 3)} deg"
+            f" where the hand turned by {significant(np.rad2deg(np.median(turned)), 3)}"
         )
     else:
         return None

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from hecbench.recording import CameraModel
+from hecbench.system.wording import significant
 from hecbench.verdict.answers import Answer, predicts_better
 
 _DETERMINED = 0.5
@@ -55,7 +56,9 @@ def moved(free: Answer, given: CameraModel | None) -> str:
         return "brings its own camera"
     focal = 100 * (np.sqrt(np.linalg.det(camera.K[:2, :2]) / np.linalg.det(given.K[:2, :2])) - 1)
     centre = np.linalg.norm(camera.K[:2, 2] - given.K[:2, 2])
-    return f"moves the principal point by {centre:.2g} px and the focal length by {focal:+.2g} %"
+    return (
+        f"moves the principal point by {significant(float(centre))} px and the focal length by {focal:+.2g} %"
+    )
 
 
 def suspicion(answers: Sequence[Answer], best: Answer, given: CameraModel | None) -> str | None:

@@ -15,6 +15,7 @@ from hecbench import se3
 from hecbench.errors import InputError
 from hecbench.estimate import Estimate, decode, plain
 from hecbench.system import files
+from hecbench.system.wording import significant
 
 SCHEMA = "hecbench.verdict/1"
 
@@ -42,7 +43,7 @@ class Expected:
     high: float
 
     def __str__(self) -> str:
-        return f"{self.value:.2g} mm [{self.low:.2g}, {self.high:.2g}]"
+        return f"{significant(self.value)} mm [{significant(self.low)}, {significant(self.high)}]"
 
 
 @dataclass(frozen=True)

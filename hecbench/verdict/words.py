@@ -10,6 +10,7 @@ import numpy as np
 from hecbench import se3
 from hecbench.estimate import Metric
 from hecbench.recording import CameraModel, Recording
+from hecbench.system.wording import significant
 from hecbench.verdict import camera as cameras
 from hecbench.verdict.answers import TARGET_POSES, Answer
 from hecbench.verdict.result import Expected
@@ -32,16 +33,16 @@ def reasons(
         other = confirmed[0]
         said.append(
             f"{other.solver}, which looks at {_LOOKS_AT[other.sees_target]} and not at {_LOOKS_AT[best.sees_target]},"
-            f" agrees within {apart_mm(other):.2g} mm"
+            f" agrees within {significant(apart_mm(other))} mm"
         )
     if near:
         kin = [answer for answer in near if answer not in confirmed]
         if kin:
             said.append(
                 f"{len(kin)} methods on the same evidence agree, the nearest is {kin[0].solver} at"
-                f" {apart_mm(kin[0]):.2g} mm"
+                f" {significant(apart_mm(kin[0]))} mm"
                 if len(kin) > 1
-                else f"{kin[0].solver}, on the same evidence, agrees within {apart_mm(kin[0]):.2g} mm"
+                else f"{kin[0].solver}, on the same evidence, agrees within {significant(apart_mm(kin[0]))} mm"
             )
     elif not doubts:
         said.append("no other method confirms it")
@@ -88,14 +89,14 @@ def why_apart(
         and theirs is not None
         and (mine < theirs) == metric.smaller_is_better
     ):
-        text = f"{metric.label}: {theirs:.3g} against {mine:.3g}"
+        text = f"{metric.label}: {significant(theirs, 3)} against {significant(mine, 3)}"
         if answer.evidence == TARGET_POSES and best.evidence != TARGET_POSES:
             text += "; it weighs single-view target poses alike, near or far, tilted or not"
         return text
     if suspects:
         return f"see the finding {suspects[0]['id']}: {suspects[0]['summary']}"
     if np.isfinite(answer.rms_m) and answer.rms_m > best.rms_m:
-        return f"its own expected error is {1e3 * answer.rms_m:.2g} mm"
+        return f"its own expected error is {significant(1e3 * answer.rms_m)} mm"
     return "not known"
 
 

@@ -19,6 +19,7 @@ from hecbench.recording import Mounting, Recording, RobotDescription
 from hecbench.registry import hookimpl
 from hecbench.se3 import Array
 from hecbench.specs import DatasetSpec
+from hecbench.system.wording import significant
 from hecbench_datasets.reading.sources import foreign
 from hecbench_datasets.reading.streams import interpolate
 
@@ -58,7 +59,9 @@ def load(path: Path) -> Recording:
     truth = "X" if mounting is Mounting.EYE_IN_HAND else "Y"
     notes = [f"{path}: true clock offset {sequence['time_offset_s']:.4f} s removed"]
     if sequence["scale"] != 1:
-        notes.append(f"{path}: target translations carry the unknown scale {sequence['scale']:.3g}")
+        notes.append(
+            f"{path}: target translations carry the unknown scale {significant(sequence['scale'], 3)}"
+        )
     return Recording(
         name=name,
         mounting=mounting,

@@ -20,6 +20,7 @@ from hecbench.recording import Mounting, Recording
 from hecbench.registry import hookimpl
 from hecbench.se3 import Array
 from hecbench.specs import DatasetSpec
+from hecbench.system.wording import significant
 from hecbench_datasets.reading.hints import Hints, hints_for
 from hecbench_datasets.reading.pairing import Documented, paired
 from hecbench_datasets.reading.sources import files_in, foreign, head, table, text, zip_bytes, zip_names
@@ -104,7 +105,7 @@ def load(path: Path) -> Recording:
     for (file, name), stamps in zip(found, (robot_stamps, camera_stamps), strict=True):
         if np.ptp(stamps) > _LONGEST_S:
             raise InputError(
-                f"{file}{name and f': {name}'}: its stamps span {np.ptp(stamps):.3g} s; give one recording"
+                f"{file}{name and f': {name}'}: its stamps span {significant(np.ptp(stamps), 3)} s; give one recording"
             )
     hints, _ = hints_for(path)
     rows = np.arange(len(camera))

@@ -21,6 +21,7 @@ from hecbench.recording import Recording
 from hecbench.samples.agreement import contradiction
 from hecbench.samples.standstills import one_per_robot_pose
 from hecbench.se3 import Array
+from hecbench.system.wording import significant
 from hecbench_plugins.markers.settings import HAND_EYE
 from hecbench_plugins.markers.target_poses import target_poses
 
@@ -127,11 +128,12 @@ def require_two_rotation_axes(pairs: PosedSamples) -> None:
         first, second, _ = np.append(rotation_diversity_deg(logs), 0.0)[:3]
         if first < HAND_EYE.least_rotation_deg:
             raise Refusal(
-                f"the {name} hardly rotates ({first:.2g} deg rms): tilt it by 20 deg or more between samples"
+                f"the {name} hardly rotates ({significant(first)} deg rms): tilt it by 20 deg or more between samples"
             )
         if second < HAND_EYE.least_rotation_deg:
             raise Refusal(
-                f"the {name} rotates about one axis only ({first:.3g} deg rms, {second:.2g} about others): "
+                f"the {name} rotates about one axis only ({significant(first, 3)} deg rms, "
+                f"{significant(second)} about others): "
                 "add samples turned about a second axis"
             )
 

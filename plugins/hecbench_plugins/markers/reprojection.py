@@ -16,6 +16,7 @@ from hecbench.recording import Recording
 from hecbench.samples.agreement import LARGEST_SHARE, share_left
 from hecbench.samples.standstills import one_per_robot_pose
 from hecbench.se3 import Array
+from hecbench.system.wording import significant
 from hecbench_plugins.markers import single3d
 from hecbench_plugins.markers.hand_eye import pose_pairs
 from hecbench_plugins.markers.opencv_hand_eye import robot_world
@@ -75,7 +76,8 @@ def adjust_with_exact_robot(recording: Recording, problem: Problem) -> Solution:
     moved_px = np.linalg.norm(centres_px - np.median(centres_px, axis=0), axis=1)
     if share_left(left_px, moved_px) > LARGEST_SHARE:
         raise SolverFailure(
-            f"leaves {np.median(left_px):.3g} px in the median where the target moved by {np.median(moved_px):.3g}: "
+            f"leaves {significant(np.median(left_px), 3)} px in the median where the target moved by "
+            f"{significant(np.median(moved_px), 3)}: "
             "are the robot poses inverted, or the mounting wrong?"
         )
     return best

@@ -19,6 +19,7 @@ from hecbench.estimate import Estimate, Termination
 from hecbench.recording import Recording
 from hecbench.samples.agreement import LARGEST_SHARE, percent, share_left
 from hecbench.se3 import Array
+from hecbench.system.wording import significant
 from hecbench_plugins.markers.hand_eye import posed_samples, rotation_diversity_deg
 from hecbench_plugins.markers.settings import HAND_EYE, SINGLE3D, Single3dSettings
 
@@ -102,7 +103,8 @@ def marker_positions(recording: Recording) -> MarkerPositions:
     diversity_deg = rotation_diversity_deg(logs)
     if diversity_deg[1] < HAND_EYE.least_rotation_deg:
         raise Refusal(
-            f"the hand rotates by {diversity_deg[0]:.3g} deg rms about one axis and {diversity_deg[1]:.2g} "
+            f"the hand rotates by {significant(diversity_deg[0], 3)} deg rms about one axis and "
+            f"{significant(diversity_deg[1])} "
             "about any other: add samples turned by 20 deg or more about a second axis"
         )
     return MarkerPositions(chosen, se3.transform_points(camera_T_target, marker[None])[:, 0])

@@ -13,6 +13,7 @@ from hecbench.estimate import Estimate
 from hecbench.recording import Recording
 from hecbench.registry import hookimpl
 from hecbench.specs import Need, SolverSpec
+from hecbench.system.wording import significant
 from hecbench_plugins.markers.hand_eye import (
     PosedSamples,
     pose_pairs,
@@ -58,7 +59,7 @@ def _require_usable_pairs(pairs: PosedSamples) -> int:
     if second < HAND_EYE.least_rotation_deg:
         raise Refusal(
             f"only {usable.sum()} of {len(usable)} pairs turn by 17 to 116 deg, the range this method uses, "
-            f"and by {second:.2g} deg rms about their second axis: add samples tilted by 20 to 60 deg"
+            f"and by {significant(second)} deg rms about their second axis: add samples tilted by 20 to 60 deg"
         )
     return int(usable.sum())
 
