@@ -47,6 +47,7 @@ def cost(checkout, arguments):
     process = subprocess.Popen(
         [sys.executable, "-c", "from hecbench.commands.cli import main; main()", *arguments],
         env={**os.environ, "PYTHONPATH": os.pathsep.join(places)},
+        cwd=checkout,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
     )
