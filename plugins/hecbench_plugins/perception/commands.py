@@ -117,7 +117,7 @@ def perception(
     from hecbench_plugins.perception.product import write_model
     from hecbench_plugins.perception.training import Training
 
-    _train(Training(plan, click.echo), write_model, out, "the model, its card and its curve")
+    _train(out, lambda: Training(plan, click.echo), write_model, "the model, its card and its curve")
 
 
 @train.command()
@@ -172,7 +172,7 @@ def regression(
     from hecbench_plugins.regression.product import write_model
     from hecbench_plugins.regression.training import Training
 
-    _train(Training(plan, click.echo), write_model, out, "the model, its card and its curve")
+    _train(out, lambda: Training(plan, click.echo), write_model, "the model, its card and its curve")
 
 
 @train.command()
@@ -200,7 +200,7 @@ def translation(
     plan.check()
     from hecbench_plugins.translation.training import Training, write_model
 
-    _train(Training(plan, click.echo), write_model, out, "the translator and its card")
+    _train(out, lambda: Training(plan, click.echo), write_model, "the translator and its card")
 
 
 def _start(given: Path) -> Path:
@@ -210,12 +210,20 @@ def _start(given: Path) -> Path:
     return given if given.exists() else installed_folder(str(given)) or given
 
 
-def _train(training: _T, write_model: Callable[[_T], Path], out: Path, written: str) -> None:
-    """Train to the end and write the model; say in one line that its folder cannot be written."""
+def _train(out: Path, begin: Callable[[], _T], write_model: Callable[[_T], Path], written: str) -> None:
+    """Train to the end and write the model; say in one line that its folder or the memory is too small for it."""
+    from hecbench_plugins.perception.run_folder import reserved
+
     try:
-        training.run()
-        click.echo(f"{write_model(training)}: {written}")
+        with reserved(out):
+            training = begin()
+            training.run()
+            click.echo(f"{write_model(training)}: {written}")
     except OSError as error:
         raise HecbenchError(
             f"{out}: cannot be written ({error.strerror}); make room and start again"
         ) from error
+    except (MemoryError, RuntimeError) as error:
+        if isinstance(error, RuntimeError) and "allocate" not in str(error):  # torch's word for it
+            raise
+        raise HecbenchError(f"{out}: the memory does not suffice; give smaller pictures or batches") from error

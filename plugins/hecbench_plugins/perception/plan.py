@@ -9,6 +9,25 @@ from hecbench.errors import InputError
 
 STRIDE = 32
 """The sides of every picture that the network takes are multiples of this, px."""
+LARGEST_PX = 1024
+"""Of a side of the drawn pictures."""
+_LARGEST_BATCH, _MOST_THREADS, _LARGEST_SEED = 1024, 1024, 2**63 - 1
+
+
+def require_within(option: str, value: int, least: int, most: int) -> None:
+    """Refuse a number outside what an option takes.
+
+    Raises:
+        InputError: naming the option and its limits.
+    """
+    if not least <= value <= most:
+        raise InputError(f"{option} must be {least} to {most}, is {value}")
+
+
+def require_processor(seed: int, threads: int) -> None:
+    """Refuse a seed or a number of threads that torch does not take; errors as of `require_within`."""
+    require_within("--seed", seed, 0, _LARGEST_SEED)
+    require_within("--threads", threads, 1, _MOST_THREADS)
 
 
 @dataclass(frozen=True)
@@ -53,10 +72,11 @@ class Plan:
             raise InputError(f"--hours must be positive, is {self.hours}")
         if self.steps is not None and self.steps < 1:
             raise InputError(f"--steps must be 1 or more, is {self.steps}")
-        if self.size < 2 * STRIDE or self.size % STRIDE:
+        if self.size % STRIDE:
             raise InputError(f"--size must be a multiple of {STRIDE}, {2 * STRIDE} or more, is {self.size}")
-        if self.batch < 2:
-            raise InputError(f"--batch must be 2 or more, is {self.batch}")
+        require_within("--size", self.size, 2 * STRIDE, LARGEST_PX)
+        require_within("--batch", self.batch, 2, _LARGEST_BATCH)
+        require_processor(self.seed, self.threads)
 
     def __str__(self) -> str:
         settings = (

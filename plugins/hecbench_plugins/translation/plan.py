@@ -7,6 +7,7 @@ from enum import StrEnum
 from pathlib import Path
 
 from hecbench.errors import InputError
+from hecbench_plugins.perception.plan import LARGEST_PX, require_processor, require_within
 
 _SMALL_PX = 128
 """Sizes up to this are for processors and get a small generator; the published ones are for 256 px."""
@@ -54,10 +55,12 @@ class Plan:
         """
         if self.steps < 2:
             raise InputError(f"--steps must be 2 or more, is {self.steps}")
-        if self.size < 2 * _MULTIPLE or self.size % _MULTIPLE:
+        if self.size % _MULTIPLE:
             raise InputError(
                 f"--size must be a multiple of {_MULTIPLE}, {2 * _MULTIPLE} or more, is {self.size}"
             )
+        require_within("--size", self.size, 2 * _MULTIPLE, LARGEST_PX)
+        require_processor(self.seed, self.threads)
 
     @property
     def width(self) -> int:
