@@ -226,4 +226,6 @@ def _train(out: Path, begin: Callable[[], _T], write_model: Callable[[_T], Path]
     except (MemoryError, RuntimeError) as error:
         if isinstance(error, RuntimeError) and "allocate" not in str(error):  # torch's word for it
             raise
-        raise HecbenchError(f"{out}: the memory does not suffice; give smaller pictures or batches") from error
+        raise HecbenchError(
+            f"{out}: the memory does not suffice; give smaller pictures or batches"
+        ) from error
