@@ -6,7 +6,6 @@ writing. Appending starts on a fresh line, whatever came before, and one process
 
 from __future__ import annotations
 
-import fcntl
 import os
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -75,10 +74,7 @@ def writing(
     except OSError as error:
         raise HecbenchError(f"{path}: cannot be written ({error.strerror}); choose another --out") from error
     try:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise InputError(f"{path}: {busy} or choose another --out") from None
+        files.keep_others_out(descriptor, f"{path}: {busy} or choose another --out")
         size = os.fstat(descriptor).st_size
         if size and not resume:
             raise InputError(f"{path}: holds {holds} already; give --resume to go on, or another --out")

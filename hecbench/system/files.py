@@ -1,7 +1,8 @@
-"""Files that are whole or absent: written aside, then renamed."""
+"""Files that are whole or absent: written aside, then renamed; and kept by one process."""
 
 from __future__ import annotations
 
+import fcntl
 import hashlib
 import os
 import re
@@ -38,6 +39,18 @@ def replacing(path: Path) -> Iterator[IO[bytes]]:
     except BaseException:
         Path(aside).unlink(missing_ok=True)
         raise
+
+
+def keep_others_out(descriptor: int, refusal: str) -> None:
+    """Lock an open file or folder for this process, until it is closed.
+
+    Raises:
+        InputError: another process has it; `refusal` is its message.
+    """
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError:
+        raise InputError(refusal) from None
 
 
 def write_bytes(path: Path, content: bytes) -> None:

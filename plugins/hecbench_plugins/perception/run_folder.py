@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import fcntl
 import os
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from hecbench.errors import HecbenchError, InputError
+from hecbench.errors import HecbenchError
+from hecbench.system import files
 
 
 @contextmanager
@@ -29,12 +29,9 @@ def reserved(folder: Path) -> Iterator[None]:
             f"{folder}: cannot be written ({error.strerror}); choose another --out"
         ) from error
     try:
-        try:
-            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except OSError:
-            raise InputError(
-                f"{folder}: another process trains into it; wait for it, or choose another --out"
-            ) from None
+        files.keep_others_out(
+            descriptor, f"{folder}: another process trains into it; wait for it, or choose another --out"
+        )
         yield
     finally:
         os.close(descriptor)
