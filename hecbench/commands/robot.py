@@ -54,11 +54,9 @@ def robot(source: str, joints: str | None, picture: Path | None, as_json: bool) 
     for joint in found["joints"]:
         if joint["type"] != "fixed":
             follows = f", follows {joint['mimic']}" if joint["mimic"] else ""
-            limits = (
-                ""
-                if joint["lower"] is None
-                else f" {significant(joint['lower'], 4)} to {significant(joint['upper'], 4)}"
-            )
+            limits = ""
+            if joint["lower"] is not None:
+                limits = f" {significant(joint['lower'], 4)} to {significant(joint['upper'], 4)}"
             click.echo(f"  {joint['name']}: {joint['type']}{limits}{follows}")
     for note in found["notes"]:
         click.echo(f"  note: {note}")

@@ -31,7 +31,7 @@ def examine(case: Examination) -> tuple[Finding | None, Examination]:
     where = "around its origin, as trackers see them" if around else f"along its {along} axis, not along +z"
     summary = (
         f"camera_T_target is not in an optical frame (z forward, x right): the targets lie {where}; the typical one at "
-        f"({', '.join(f'{significant(value)}' for value in typical)}) m"
+        f"({', '.join(significant(value) for value in typical)}) m"
     )
     action = "the answer is for this frame (camera_link, a tracker ...); photographs need the optical frame"
     return Finding(ID, Severity.INFO, summary, action), case

@@ -135,7 +135,7 @@ def _described(result: Judged, case: Examination) -> tuple[str, str]:
             f"{_REFIT}{_matrix_values(camera)}; rectified pictures need the matrix P of the rectification",
         )
     if rival.free:
-        values = f"distortion [{', '.join(f'{significant(k, 4)}' for k in camera.distortion)}]"
+        values = f"distortion [{', '.join(significant(k, 4) for k in camera.distortion)}]"
         if camera.distortion_model == EQUIDISTANT:
             values += ' with distortion_model "equidistant"'
         matrix = "" if 0 not in rival.free else f"{_matrix_values(camera)}, "

@@ -76,10 +76,9 @@ def _by_stamps(case: Examination) -> Finding | None:
         return Finding(ID, Severity.OK, summary, value=worst, limit=LIMIT_LAG_S)
     concerned = tuple(recording.sample_ids[i] for i in known[off].tolist())
     summary = (
-        f"image and robot pose of {names(concerned)} are up to {significant(1e3 * worst, 3)} ms farther "
-        "apart than usual, "
-        f"in which the arm moves by up to {significant(moved_mm[off].max())} mm and "
-        f"{significant(moved_deg[off].max())} deg"
+        f"image and robot pose of {names(concerned)} are up to {significant(1e3 * worst, 3)} ms farther"
+        f" apart than usual, in which the arm moves by up to {significant(moved_mm[off].max())} mm and"
+        f" {significant(moved_deg[off].max())} deg"
     )
     return Finding(ID, Severity.CRITICAL, summary, _CURE, worst, LIMIT_LAG_S, concerned)
 

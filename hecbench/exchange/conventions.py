@@ -255,9 +255,8 @@ def _cause(
         scaled[:, :3, 3] *= (factor := length_factor(hand, seen))
         if factor > 0 and stillness(hand, scaled).relative < _CONVINCING:
             return (
-                f", but {candidate.name} does once the target's lengths are {significant(factor, 4)} "
-                "times as long: correct the "
-                "unit of one of the two"
+                f", but {candidate.name} does once the target's lengths are {significant(factor, 4)}"
+                " times as long: correct the unit of one of the two"
             )
     return ""
 
