@@ -36,6 +36,12 @@ class Arm:
         """Of the mesh's surface."""
         return normals(self.mesh)
 
+    def classes(self, face: NDArray[np.int32]) -> NDArray[np.uint8]:
+        """The colour class (H, W) of the face that each pixel sees, 0 where it sees none."""
+        seen, found = face >= 0, np.zeros(face.shape, np.uint8)
+        found[seen] = self.part_class[self.mesh.face_part[face[seen]]]
+        return found
+
     def keypoint_positions(self, frame_T_link: ArrayLike) -> Array:
         """(..., K, 3) m in the frame of frame_T_link (..., L, 4, 4)."""
         return keypoint_positions(self.model.links, self.keypoints, frame_T_link)

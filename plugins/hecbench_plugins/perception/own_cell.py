@@ -117,13 +117,11 @@ class WithOwnCells:
         fine = SUPERSAMPLING * self.size
         renderer = Renderer(cell.arm.mesh, supersampled(K), fine, fine)
         renderer.rasterise(poses)
-        classes = np.zeros((fine, fine), np.uint8)
-        seen = renderer.face >= 0
-        classes[seen] = cell.arm.part_class[cell.arm.mesh.face_part[renderer.face[seen]]]
+        classes = cell.arm.classes(renderer.face)
         photograph = cell.canvas.images[view][top : top + side, left : left + side]
         way = cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
         small = cv2.resize(photograph, (self.size, self.size), interpolation=way).astype(np.float32) / 255
-        shares = shares_of(classes, seen, len(self.family.palette), self.size // 2)
+        shares = shares_of(classes, classes > 0, len(self.family.palette), self.size // 2)
         return Example(photographed(small, rng), shares, pixels_of(points, K), visible_known=False)
 
 

@@ -93,8 +93,7 @@ class PictureMaker:
         arm = self.family.arms[rng.integers(len(self.family.arms))]
         scene = random_scene(arm, self.size, rng)
         seen = scene.renderer.face >= 0
-        classes = np.zeros((side, side), np.uint8)
-        classes[seen] = arm.part_class[arm.mesh.face_part[scene.renderer.face[seen]]]
+        classes = arm.classes(scene.renderer.face)
         background = self._background(side)
         if rng.random() < self.empty:
             nothing = np.zeros_like(seen)
