@@ -45,7 +45,7 @@ class Cell:
 
     Attributes:
         arm: the robot.
-        canvas: N photographs without the lens.
+        canvas: N photographs without the lens, all but those that the whole robot is behind.
         camera_T_link: (N, L, 4, 4) m, in the order of the arm's links.
     """
 
@@ -73,8 +73,9 @@ class Cell:
         except Refusal as reason:
             raise InputError(f"{path}: {reason}") from None
         links = [posed.model.link_index(link) for link in arm.model.links]
-        camera_T_parent = se3.inverse(_camera(path, recording))
-        return Cell(arm, canvas, camera_T_parent @ canvas.parent_T_link[:, links])
+        camera_T_link = se3.inverse(_camera(path, recording)) @ canvas.parent_T_link[:, links]
+        shown = np.flatnonzero((arm.keypoint_positions(camera_T_link)[..., 2] > 0).any(1))
+        return Cell(arm, canvas.subset(shown), camera_T_link[shown])
 
 
 def _camera(path: Path, recording: Recording) -> Array:

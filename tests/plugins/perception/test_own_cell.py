@@ -10,6 +10,7 @@ pytest.importorskip("safetensors")
 pytest.importorskip("onnx")
 
 from click.testing import CliRunner  # noqa: E402
+from hecbench_plugins.perception import own_cell  # noqa: E402
 from hecbench_plugins.perception.choice import installed_folder  # noqa: E402
 from hecbench_plugins.perception.commands import train  # noqa: E402
 from hecbench_plugins.perception.family import Family  # noqa: E402
@@ -61,6 +62,24 @@ def test_examples_are_labelled_parts_of_the_photographs(family, cell):
         assert inside.any()
         assert np.median(robot[v[inside], u[inside]]) > 127  # joints lie inside of the robot
     assert 2 <= own <= 12
+
+
+def test_a_photograph_that_the_robot_is_behind_is_left_out(shared, family, monkeypatch):
+    truth = recording_io.load(shared / "data" / LIT).truth_parent_T_camera
+    turned = truth @ np.diag([-1, 1, -1, 1.0]) @ se3.inverse(truth)
+    whole = own_cell.undistorted_canvas
+
+    def one_behind(recording, posed):
+        canvas = whole(recording, posed)
+        poses = canvas.parent_T_link.copy()
+        poses[0] = turned @ poses[0]
+        return replace(canvas, parent_T_link=poses)
+
+    monkeypatch.setattr(own_cell, "undistorted_canvas", one_behind)
+    cell = Cell.of(shared / "data" / LIT, family)
+    assert len(cell.canvas) == len(cell.camera_T_link) == 4
+    mixed = WithOwnCells(PictureMaker(family, 96, 3), [cell])
+    assert all(mixed.example().image.shape == (96, 96, 3) for _ in range(12))
 
 
 def test_a_recording_that_teaches_nothing_is_refused(shared, family, tmp_path):
